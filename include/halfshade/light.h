@@ -1,0 +1,42 @@
+// Lights, camera and view as the user describes them, in world space.
+#pragma once
+
+#include <string>
+
+#include "halfshade/types.h"
+
+namespace halfshade {
+
+enum class LightShape { kPoint, kRectangle, kDisk, kSphere, kSamples };
+
+/// An area light. Which members count depends on `shape`:
+///   kPoint      center
+///   kRectangle  center, u, v (full edge vectors); faces u x v
+///   kDisk       center, normal, radius; faces `normal`
+///   kSphere     center, radius
+///   kSamples    points: explicit, possibly volumetric, sample positions
+/// One-sided flat lights give no light to receivers at or behind their plane.
+struct Light {
+  std::string name = "light";
+  LightShape shape = LightShape::kRectangle;
+  dvec3 center{0.0};
+  dvec3 u{1.0, 0.0, 0.0}, v{0.0, 0.0, 1.0};
+  dvec3 normal{0.0, -1.0, 0.0};
+  double radius = 0.0;
+  std::vector<dvec3> points;
+  bool two_sided = false;
+  vec3 emission{1.0f};
+};
+
+/// Pinhole camera, right-handed: looks from `eye` towards `target`; image row 0 is the top.
+struct Camera {
+  dvec3 eye{0.0, 0.0, 5.0}, target{0.0}, up{0.0, 1.0, 0.0};
+  double fov_y_deg = 45.0;
+};
+
+struct View {
+  Camera camera;
+  std::vector<Light> lights;
+};
+
+}  // namespace halfshade

@@ -1,0 +1,29 @@
+// The rasterizer, top to bottom: lattice triangles -> clip -> setup -> bin -> coverage and depth -> G-buffer.
+#pragma once
+
+#include "halfshade/light.h"
+#include "rasterizer/core/mesh.h"
+#include "rasterizer/gbuffer.h"
+
+namespace halfshade {
+
+struct RasterConfig {
+  std::uint32_t width = 512, height = 512;  // whole picture in samples (pixels times subsamples per axis); 1..16384 each
+  PixelWindow window;                       // part to render, in samples; all zero = whole picture
+};
+
+struct RasterStats {
+  std::uint64_t triangles_in = 0;
+  std::uint64_t triangles_clipped = 0;   // crossed the near plane or the guard band
+  std::uint64_t triangles_binned = 0;    // survived set-up
+  std::uint64_t tile_entries = 0;        // (tile, triangle) pairs
+  std::uint64_t samples_covered = 0;     // coverage bits before the depth test
+};
+
+/// Draws `mesh` as seen from `camera` (world space) into `gbuffer`. Runs in the calling thread's TBB arena.
+/// Equal inputs give equal bits for any number of threads, any instruction set and any window.
+/// Throws Error{kUsage} for a size or window out of range or a degenerate camera.
+void rasterize(const LatticeMesh& mesh, const Camera& camera, const RasterConfig& config, GBuffer& gbuffer,
+               RasterStats* stats = nullptr);
+
+}  // namespace halfshade
