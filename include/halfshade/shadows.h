@@ -1,0 +1,86 @@
+// Exact visibility of area lights: one bit for every (receiver, light sample).
+#pragma once
+
+#include <string>
+
+#include "halfshade/error.h"
+#include "halfshade/light.h"
+#include "halfshade/scene.h"
+
+namespace halfshade {
+
+enum class ShadowMethod {
+  kAliasFreeShadowMap,  // "afsm": Sintorn, Eisemann, Assarsson 2008
+  kOracle,              // "oracle": brute force over all triangles, for checking; slow
+};
+
+enum class SamplePattern {
+  kRows,        // rows of equal height share v, each row shifted by its own lattice offset
+  kUniform,     // cell centres
+  kStratified,  // one jittered sample per cell
+};
+
+/// Defaults here, set by designated initialisers.
+struct ShadowConfig {
+  ShadowMethod method = ShadowMethod::kAliasFreeShadowMap;
+  std::uint32_t light_sample_count = 256;       // 1..4096; point lights always use 1, explicit samples their own number
+  SamplePattern pattern = SamplePattern::kRows;
+  std::uint32_t sample_sets = 1;                // 1..256 different sets, chosen per receiver by hash(pixel, seed)
+  std::uint32_t seed = 0;                       // same seed, same bits, on every platform
+  std::uint32_t grid_resolution = 0;            // afsm: cells per axis of the light view, 16..2048; 0 = chosen from the number of receivers
+};
+
+/// Blocked masks of all receivers: bit i of a receiver's words is set where light sample i is hidden.
+struct VisibilityMasks {
+  std::size_t receiver_count = 0;
+  std::uint32_t sample_count = 0;
+  std::size_t words_per_receiver = 0;
+  std::vector<std::uint64_t> words;  // [receiver][word], row-major; bits past sample_count are zero
+
+  void reset(std::size_t receivers, std::uint32_t samples);
+  std::span<const std::uint64_t> mask(std::size_t receiver) const {
+    return {words.data() + receiver * words_per_receiver, words_per_receiver};
+  }
+  bool blocked(std::size_t receiver, std::uint32_t sample) const {
+    return (words[receiver * words_per_receiver + sample / 64] >> (sample % 64)) & 1;
+  }
+  std::uint32_t blocked_count(std::size_t receiver) const;
+  /// Fraction of samples not hidden, in [0, 1].
+  float visibility(std::size_t receiver) const {
+    return 1.0f - static_cast<float>(blocked_count(receiver)) / static_cast<float>(sample_count);
+  }
+  /// XXH3-128 over receiver count, sample count (both 64-bit) and the words, as 32 hexadecimal digits.
+  std::string hash() const;
+};
+
+/// Counters and times of one solve. Milliseconds are wall time.
+struct ShadowStats {
+  double index_ms = 0.0;    // receivers into the light view's lists
+  double cull_ms = 0.0;     // influence regions of the blockers
+  double test_ms = 0.0;     // blockers against receivers and samples
+  std::uint64_t receivers = 0, triangles = 0;
+  std::uint64_t pairs_tested = 0;      // (blocker, receiver) pairs that reached the kernel
+  std::uint64_t pairs_sampled = 0;     // of these, tested sample by sample
+  std::uint64_t pairs_necessary = 0;   // of these, added at least one blocked bit
+  std::uint64_t sample_tests = 0;      // (blocker, receiver, sample) tests by the float filter
+  std::uint64_t exact_fallbacks = 0;   // of these, handed to the exact predicate
+  std::uint64_t lists_occupied = 0, lists_longest = 0;  // light-view cells with receivers; most receivers in one
+  std::uint64_t everywhere_blockers = 0;                // triangles without a bounded influence region
+  std::uint64_t bytes = 0;             // working memory of the method, without masks
+};
+
+/// A surface point that asks for the light.
+struct Receiver {
+  dvec3 position_world{0.0};
+  std::uint32_t triangle = kNone;  // the triangle it lies on, which never blocks it; kNone if none
+};
+
+/// Answers `blocks(triangle, receiver, sample)` for every receiver and every sample of `light`; masks in receiver order.
+/// Positions are rounded to the lattice of the scene's local frame first (docs/decisions/0001); the answer is the one of
+/// exact arithmetic on the rounded points. Receivers behind a one-sided light are marked blocked in every sample.
+/// Throws Error{kUsage} for a configuration out of range, Error{kBadInput} for non-finite positions.
+/// Runs in the calling thread's TBB arena. Distinct calls may run concurrently.
+void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                   const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats = nullptr);
+
+}  // namespace halfshade

@@ -1,0 +1,42 @@
+// Opacity of an alpha-tested triangle where a shadow segment crosses it, decided exactly.
+//
+// The hit divides the triangle by the three edge determinants w_i = det(edge_i, l - r), integers on the lattice; the
+// texture coordinate is the rational number sum(w_i uv_i) / sum(w_i). The texel under it is floor(u W) mod W, decided in
+// double where the error bound allows, otherwise by comparing 256-bit integers, so that every method, thread and
+// instruction set reads the same texel (stability.md b and B7).
+#pragma once
+
+#include "rasterizer/core/mesh.h"
+#include "rasterizer/core/predicate.h"
+
+namespace halfshade {
+
+/// Texture coordinates live on multiples of 2^-32, |uv| <= 2^30.
+inline constexpr double kUvUnitsPerOne = 0x1p32;
+
+/// Smallest alpha (0..255) that counts as opaque: alpha / 255 >= cutoff.
+std::uint32_t opaque_threshold(float cutoff);
+
+/// An alpha-tested triangle, gathered for repeated lookups. References the scene's map.
+struct AlphaTriangle {
+  std::array<vec3, 3> corners;
+  std::array<std::int64_t, 3> u, v;  // texture coordinates of the corners in 2^-32
+  const AlphaMap* map = nullptr;
+  std::uint32_t threshold = 128;
+};
+
+AlphaTriangle make_alpha_triangle(const LatticeMesh& mesh, std::uint32_t triangle);
+
+/// Texel (column, row; row 0 = top) where the segment r-l crosses the triangle. Requires blocks(corners, r, l).
+/// `exact_fallbacks`, if given, is incremented for each coordinate that double could not decide.
+std::array<std::uint32_t, 2> texel_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l,
+                                          std::uint64_t* exact_fallbacks = nullptr);
+
+/// Same requirement; true where the texel under the hit is opaque.
+inline bool opaque_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l,
+                          std::uint64_t* exact_fallbacks = nullptr) {
+  const auto [column, row] = texel_at_hit(triangle, r, l, exact_fallbacks);
+  return triangle.map->alpha[std::size_t{row} * triangle.map->width + column] >= triangle.threshold;
+}
+
+}  // namespace halfshade

@@ -1,0 +1,196 @@
+#include "shadows/light_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rasterizer/core/parallel.h"
+
+namespace halfshade {
+namespace {
+
+/// Receivers nearer to the light's plane than this fraction of the farthest one are not projected.
+constexpr double kNearFraction = 1e-3;
+/// Blockers are clipped at this fraction of the gap between light and nearest projected receiver.
+constexpr double kClipFraction = 1.0 / 16.0;
+/// Bounds are widened by this factor against rounding: doubles of order one carry errors near 1e-15.
+constexpr double kWiden = 1.0 + 1e-9;
+
+/// Convex polygon with edges along eight directions around points in the plane; four if `corners` is 4.
+std::vector<dvec2> polygon_around(const std::vector<dvec2>& points, int corners) {
+  const double d = 0.7071067811865476;
+  const std::array<dvec2, 8> normals = {dvec2(1, 0), dvec2(d, d),   dvec2(0, 1),  dvec2(-d, d),
+                                        dvec2(-1, 0), dvec2(-d, -d), dvec2(0, -1), dvec2(d, -d)};
+  const int step = 8 / corners;
+  std::vector<double> support;
+  for (int k = 0; k < 8; k += step) {
+    double reach = 0.0;
+    for (const dvec2& p : points) reach = std::max(reach, glm::dot(p, normals[k]));
+    support.push_back(reach * kWiden);
+  }
+  std::vector<dvec2> polygon;
+  for (int k = 0; k < corners; ++k) {
+    const dvec2 m = normals[k * step], n = normals[(k + 1) % corners * step];
+    const double determinant = m.x * n.y - m.y * n.x, s = support[k], t = support[(k + 1) % corners];
+    polygon.push_back(dvec2(s * n.y - t * m.y, t * m.x - s * n.x) / determinant);
+  }
+  return polygon;
+}
+
+LightView make_view(const LightBound& bound, const dvec3& x, const dvec3& y, const dvec3& z) {
+  LightView view;
+  view.origin = dvec3(bound.center);
+  view.x = x, view.y = y, view.z = z;
+  return view;
+}
+
+std::vector<LightView> make_directions(const LightBound& bound, const LightSamples& samples) {
+  const dvec3 u = samples.axis_u, v = samples.axis_v, n = samples.axis_n;
+  if (bound.flat) {
+    std::vector<LightView> views = {make_view(bound, u, v, n)};
+    if (!samples.one_sided) views.push_back(make_view(bound, v, u, -n));
+    return views;
+  }
+  std::vector<LightView> views;
+  for (int axis = 0; axis < 3; ++axis) {
+    dvec3 x(0.0), y(0.0), z(0.0);
+    z[axis] = x[(axis + 1) % 3] = y[(axis + 2) % 3] = 1.0;
+    views.push_back(make_view(bound, x, y, z));
+    views.push_back(make_view(bound, y, x, -z));
+  }
+  return views;
+}
+
+/// The view that holds a receiver: the side of a flat light it lies on, or the cube face it is seen through.
+std::size_t view_of(const std::vector<LightView>& views, const dvec3& p) {
+  std::size_t best = 0;
+  double depth = -HUGE_VAL;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const double z = glm::dot(p - views[i].origin, views[i].z);
+    if (z > depth) depth = z, best = i;
+  }
+  return best;
+}
+
+void set_light(const LightBound& bound, const LightSamples& samples, LightView& view) {
+  view.sphere_radius = bound.sphere_radius;
+  view.flat = bound.flat;
+  if (bound.sphere_radius > 0.0) {
+    view.light_depth = 1.2 * bound.sphere_radius;  // a hexagon around the silhouette reaches 1.155 radii
+  } else if (bound.flat) {
+    for (const dvec2& p : bound.outline) {
+      const dvec3 q = view.to_view(view.origin + samples.axis_u * p.x + samples.axis_v * p.y);
+      view.light_points.emplace_back(q.x, q.y, 0.0);
+    }
+    view.light_depth = glm::length(bound.half_axes[2]);
+  } else {
+    for (int corner = 0; corner < 8; ++corner) {
+      dvec3 p = view.origin;
+      for (int k = 0; k < 3; ++k) p += bound.half_axes[k] * ((corner >> k) & 1 ? 1.0 : -1.0);
+      view.light_points.push_back(view.to_view(p));
+      view.light_depth = std::max(view.light_depth, std::fabs(view.light_points.back().z));
+    }
+  }
+}
+
+/// Depth range, box and slopes of the receivers that `view` holds; near_z splits off those too close to project.
+void fit_receivers(const std::vector<dvec3>& points, LightView& view) {
+  view.far_z = 0.0;
+  for (const dvec3& p : points) view.far_z = std::max(view.far_z, p.z);
+  view.near_z = 1.1 * view.light_depth + kNearFraction * view.far_z;
+  view.clip_z = view.light_depth + kClipFraction * (view.near_z - view.light_depth);
+  view.receiver_low = dvec3(HUGE_VAL), view.slope_low = dvec2(HUGE_VAL);
+  view.receiver_high = dvec3(-HUGE_VAL), view.slope_high = dvec2(-HUGE_VAL);
+  for (const dvec3& p : points) {
+    if (view.too_near(p)) continue;
+    view.has_receivers = true;
+    view.receiver_low = glm::min(view.receiver_low, p);
+    view.receiver_high = glm::max(view.receiver_high, p);
+    view.slope_low = glm::min(view.slope_low, dvec2(p) / p.z);
+    view.slope_high = glm::max(view.slope_high, dvec2(p) / p.z);
+  }
+}
+
+void fit_grid(std::uint32_t resolution, LightView& view) {
+  LightGrid& grid = view.grid;
+  if (!view.has_receivers) return;
+  grid.columns = grid.rows = resolution;
+  grid.low = {LightGrid::warp(view.slope_low.x), LightGrid::warp(view.slope_low.y)};
+  const dvec2 high(LightGrid::warp(view.slope_high.x), LightGrid::warp(view.slope_high.y));
+  for (int k = 0; k < 2; ++k) {
+    const double extent = high[k] - grid.low[k];
+    grid.cells_per_unit[k] = extent > 0.0 ? resolution / extent : 0.0;
+  }
+}
+
+std::uint32_t choose_resolution(std::size_t receivers) {
+  const auto side = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(receivers) / 2.0));
+  return std::clamp(side, 16u, 1024u);
+}
+
+}  // namespace
+
+double LightGrid::row_border(std::uint32_t row) const {
+  if (cells_per_unit.y == 0.0) return row == 0 ? -HUGE_VAL : HUGE_VAL;
+  const double w = low.y + row / cells_per_unit.y;
+  return w >= 1.0 ? HUGE_VAL : (w <= -1.0 ? -HUGE_VAL : unwarp(w));
+}
+
+LightBound make_light_bound(const Light& light, const LightSamples& samples) {
+  LightBound bound;
+  bound.flat = samples.flat;
+  const std::array<dvec3, 3> axes = {samples.axis_u, samples.axis_v, samples.axis_n};
+  dvec3 low(HUGE_VAL), high(-HUGE_VAL);  // in the light's axes, around its centre
+  for (const vec3& l : samples.points) {
+    const dvec3 d = dvec3(l) - samples.center;
+    const dvec3 q(glm::dot(d, axes[0]), glm::dot(d, axes[1]), glm::dot(d, axes[2]));
+    low = glm::min(low, q), high = glm::max(high, q);
+  }
+  const dvec3 middle = (low + high) * 0.5;
+  bound.center = snap_to_lattice(samples.center + axes[0] * middle.x + axes[1] * middle.y + axes[2] * middle.z);
+  dvec3 reach(0.0);
+  std::vector<dvec2> in_plane;
+  for (const vec3& l : samples.points) {
+    const dvec3 d = dvec3(l) - dvec3(bound.center);
+    const dvec3 q(glm::dot(d, axes[0]), glm::dot(d, axes[1]), glm::dot(d, axes[2]));
+    reach = glm::max(reach, glm::abs(q));
+    in_plane.emplace_back(q);
+    if (light.shape == LightShape::kSphere) bound.sphere_radius = std::max(bound.sphere_radius, glm::length(d) * kWiden);
+  }
+  for (int k = 0; k < 3; ++k) bound.half_axes[k] = axes[k] * (reach[k] * kWiden);
+  if (bound.flat) bound.outline = polygon_around(in_plane, light.shape == LightShape::kRectangle ? 4 : 8);
+  return bound;
+}
+
+std::vector<LightViewCells> make_light_views(const LightBound& bound, const LightSamples& samples,
+                                             const ReceiverArray& receivers, std::uint32_t resolution) {
+  const std::vector<LightView> views = make_directions(bound, samples);
+  std::vector<std::uint8_t> holder(receivers.size());
+  parallel_ranges(receivers.size(), 8192, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      holder[i] = static_cast<std::uint8_t>(view_of(views, dvec3(receivers.position[i])));
+    }
+  });
+  std::vector<LightViewCells> result;
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    std::vector<dvec3> points;
+    for (std::size_t i = 0; i < holder.size(); ++i) {
+      if (holder[i] == k) points.push_back(views[k].to_view(dvec3(receivers.position[i])));
+    }
+    if (points.empty()) continue;
+    LightViewCells cells{views[k], std::vector<std::uint32_t>(receivers.size(), kNone)};
+    set_light(bound, samples, cells.view);
+    fit_receivers(points, cells.view);
+    fit_grid(resolution != 0 ? resolution : choose_resolution(points.size()), cells.view);
+    for (std::size_t i = 0, next = 0; i < holder.size(); ++i) {
+      if (holder[i] != k) continue;
+      const dvec3& p = points[next++];
+      const LightGrid& grid = cells.view.grid;
+      cells.cell_of_receiver[i] =
+          cells.view.too_near(p) ? cells.near_cell() : grid.row(p.y / p.z) * grid.columns + grid.column(p.x / p.z);
+    }
+    result.push_back(std::move(cells));
+  }
+  return result;
+}
+
+}  // namespace halfshade

@@ -1,0 +1,62 @@
+// Hot loop of the looping-over-triangles methods: one blocker against a run of receivers and all their light samples.
+//
+// A segment r-l passes inside an edge a-b of the blocker where det(a-r, b-a, l-r), signed by the side of the plane on
+// which r lies, is >= 0 (Sintorn, Eisemann, Assarsson 2008, sections 3.3 and 4.2: planes through receiver and edges).
+// For a fixed receiver it is linear in l: m . (l - c) + d around the light's centre c. Receivers are the lanes of the
+// first test (does the blocker hide any sample at all?); samples are the lanes of the second. Float signs within their
+// error bound of zero go to the exact predicate, so the masks are those of exact arithmetic on every instruction set.
+#pragma once
+
+#include "halfshade/shadows.h"
+#include "rasterizer/core/mesh.h"
+#include "shadows/light_samples.h"
+
+namespace halfshade {
+
+struct LightBound;
+
+/// Light samples as the kernel reads them: offsets from the light's centre, one padded run of floats per set.
+struct KernelSamples {
+  std::uint32_t count = 0;
+  std::uint32_t padded = 0;                         // count rounded up to a multiple of 64
+  vec3 center{0.0f};                                // on the lattice
+  float reach = 0.0f;                               // max |coordinate| of an offset
+  std::array<vec3, 3> half_axes{};                  // parallelepiped around all offsets
+  std::vector<float> x, y, z;                       // [set][padded]; the padding repeats the first sample
+  std::vector<std::uint64_t> valid;                 // [padded / 64]: bits of real samples
+  const LightSamples* exact = nullptr;
+};
+
+KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound);
+
+/// Receivers in the order of the lists, as parallel arrays with kLanePadding entries to spare at the end.
+struct KernelReceivers {
+  static constexpr std::size_t kLanePadding = 64;
+  std::vector<float> x, y, z;
+  std::vector<std::uint32_t> own;   // own triangle
+  std::vector<std::uint32_t> open;  // all ones while some sample is not blocked yet, then zero
+  std::vector<std::uint8_t> set;
+  std::vector<std::uint64_t> masks; // [receiver][words]
+  std::size_t words = 0;
+  std::size_t count = 0;
+};
+
+/// A blocker and the run of receivers that it may hide from the light.
+struct BlockerSpan {
+  std::uint32_t triangle, begin, end;
+};
+
+struct KernelCounters {
+  std::uint64_t pairs_tested = 0, pairs_sampled = 0, pairs_necessary = 0, sample_tests = 0, exact_fallbacks = 0;
+  void add(const KernelCounters& o);
+};
+
+/// ORs into receivers.masks what the blockers hide. Spans must stay within receivers that no other call writes.
+void test_blockers(const LatticeMesh& mesh, const KernelSamples& samples, std::span<const BlockerSpan> spans,
+                   KernelReceivers& receivers, KernelCounters& counters);
+
+/// Same contract in plain scalar code with the exact predicate alone.
+void test_blockers_reference(const LatticeMesh& mesh, const KernelSamples& samples, std::span<const BlockerSpan> spans,
+                             KernelReceivers& receivers, KernelCounters& counters);
+
+}  // namespace halfshade

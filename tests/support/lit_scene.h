@@ -1,0 +1,113 @@
+// Small scenes for tests: triangles, one light, explicit receivers, solved through the public interface.
+#pragma once
+
+#include <bit>
+#include <random>
+
+#include "halfshade/shadows.h"
+
+namespace halfshade::test {
+
+using Triangle = std::array<dvec3, 3>;
+
+inline Scene scene_of(const std::vector<Triangle>& triangles) {
+  Scene scene;
+  scene.materials.emplace_back();
+  for (const Triangle& t : triangles) {
+    const auto first = static_cast<std::uint32_t>(scene.positions.size());
+    scene.positions.insert(scene.positions.end(), t.begin(), t.end());
+    scene.triangles.push_back({first, first + 1, first + 2});
+    scene.triangle_materials.push_back(0);
+  }
+  return scene;
+}
+
+inline std::vector<Triangle> quad(const dvec3& a, const dvec3& b, const dvec3& c, const dvec3& d) {
+  return {{a, b, c}, {a, c, d}};
+}
+
+/// Closed box, wound outward.
+inline std::vector<Triangle> box(const dvec3& low, const dvec3& high) {
+  const auto corner = [&](int i) {
+    return dvec3(i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z);
+  };
+  std::vector<Triangle> result;
+  for (const auto& f : {std::array{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
+    const auto q = quad(corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]));
+    result.insert(result.end(), q.begin(), q.end());
+  }
+  return result;
+}
+
+inline std::vector<Triangle> joined(std::vector<Triangle> a, const std::vector<Triangle>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+/// The light of the stability cases: [-1,1] x {y = 4} x [-1,1], facing down.
+inline Light frame_light() {
+  Light light;
+  light.center = {0.0, 4.0, 0.0};
+  light.u = {2.0, 0.0, 0.0};  // u x v points down
+  light.v = {0.0, 0.0, 2.0};
+  return light;
+}
+
+inline ShadowConfig frame_config(std::uint32_t samples = 256) {
+  ShadowConfig config;
+  config.light_sample_count = samples;
+  config.pattern = SamplePattern::kUniform;
+  return config;
+}
+
+inline std::vector<Receiver> receivers_at(const std::vector<dvec3>& points) {
+  std::vector<Receiver> result;
+  for (const dvec3& p : points) result.push_back({p, kNone});
+  return result;
+}
+
+inline VisibilityMasks solve(const Scene& scene, const std::vector<Receiver>& receivers, const Light& light,
+                             ShadowConfig config, ShadowMethod method, ShadowStats* stats = nullptr) {
+  config.method = method;
+  VisibilityMasks masks;
+  solve_shadows(scene, receivers, light, config, masks, stats);
+  return masks;
+}
+
+inline std::uint64_t wrong_bits(const VisibilityMasks& a, const VisibilityMasks& b) {
+  if (a.words.size() != b.words.size()) return ~std::uint64_t{0};
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i < a.words.size(); ++i) count += static_cast<std::uint64_t>(std::popcount(a.words[i] ^ b.words[i]));
+  return count;
+}
+
+/// Methods whose masks must equal the oracle's in every bit.
+inline const std::vector<ShadowMethod>& exact_methods() {
+  static const std::vector<ShadowMethod> methods = {ShadowMethod::kAliasFreeShadowMap};
+  return methods;
+}
+
+/// Wrong bits of all exact methods together against the oracle.
+inline std::uint64_t wrong_bits_of_exact_methods(const Scene& scene, const std::vector<Receiver>& receivers,
+                                                 const Light& light, const ShadowConfig& config) {
+  const VisibilityMasks truth = solve(scene, receivers, light, config, ShadowMethod::kOracle);
+  std::uint64_t wrong = 0;
+  for (const ShadowMethod method : exact_methods()) {
+    wrong += wrong_bits(truth, solve(scene, receivers, light, config, method));
+  }
+  return wrong;
+}
+
+struct Random {
+  std::mt19937_64 engine;
+  explicit Random(std::uint64_t seed) : engine(seed) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine() >> 11) * 0x1p-53);
+  }
+  dvec3 in_box(double low, double high) {
+    const double x = uniform(low, high), y = uniform(low, high);
+    return {x, y, uniform(low, high)};
+  }
+};
+
+}  // namespace halfshade::test
