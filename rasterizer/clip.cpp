@@ -1,5 +1,7 @@
 #include "rasterizer/clip.h"
 
+#include <algorithm>
+
 namespace halfshade {
 namespace {
 

@@ -1,5 +1,6 @@
 #include "rasterizer/rasterizer.h"
 
+#include <hwy/cache_control.h>
 #include <algorithm>
 #include <atomic>
 
@@ -15,6 +16,7 @@ constexpr std::uint32_t kMaxPictureSide = 16384;
 constexpr std::size_t kTrianglesPerChunk = 4096;
 constexpr std::size_t kMaxTileCounters = std::size_t{1} << 22;  // (tile, chunk) pairs: 16 MiB of counts
 constexpr std::size_t kBatch = 64;                              // triangles per call of the coverage kernel
+constexpr std::uint32_t kPrefetchDistance = 8;                  // entries of a tile's list
 
 // ---- checks -----------------------------------------------------------------------------------------------------
 
@@ -167,8 +169,12 @@ void draw_tiles(const LatticeMesh& mesh, const CameraFrame& camera, const Triang
   parallel_tasks(grid.size(), [&](std::size_t tile) {
     TileRasterizer rasterizer(mesh, camera, grid.tile(tile));
     for (std::size_t chunk = 0; chunk != bins.chunk_count; ++chunk) {
-      for (std::uint32_t i = bins.offset(tile, chunk); i != bins.offset(tile, chunk + 1); ++i) {
-        rasterizer.add(chunks[chunk][bins.entries[i]]);
+      const std::vector<ScreenTriangle>& pieces = chunks[chunk];
+      const std::uint32_t end = bins.offset(tile, chunk + 1);
+      for (std::uint32_t i = bins.offset(tile, chunk); i != end; ++i) {
+        // A tile's pieces lie scattered over the chunk: ask for them ahead of time.
+        if (i + kPrefetchDistance < end) hwy::Prefetch(&pieces[bins.entries[i + kPrefetchDistance]]);
+        rasterizer.add(pieces[bins.entries[i]]);
       }
     }
     rasterizer.flush();

@@ -23,6 +23,19 @@ bool lexicographic_less(const vec3& a, const vec3& b) {
   return a.z < b.z;
 }
 
+// Pixel p has its centre at 256 p + 128: the first one inside [min, max] is ceil((min - 128) / 256), the last one
+// floor((max - 128) / 256). The range is cut to begin .. end and may be empty.
+void covered_range(const std::array<std::int32_t, 3>& fx8, std::uint32_t begin, std::uint32_t end, std::uint32_t& first,
+                   std::uint32_t& past_last) {
+  const std::int32_t low = std::min(std::min(fx8[0], fx8[1]), fx8[2]);
+  const std::int32_t high = std::max(std::max(fx8[0], fx8[1]), fx8[2]);
+  const auto begin_signed = static_cast<std::int32_t>(begin), end_signed = static_cast<std::int32_t>(end);
+  const std::int32_t p0 = std::clamp((low + 127) >> 8, begin_signed, end_signed);
+  const std::int32_t p1 = std::clamp(((high - 128) >> 8) + 1, p0, end_signed);
+  first = static_cast<std::uint32_t>(p0);
+  past_last = static_cast<std::uint32_t>(p1);
+}
+
 // 1/w of the corners bounds 1/w on the visible part; a corner behind the near plane is replaced by the plane itself.
 void set_depth_range(const std::array<vec3, 3>& corners, const CameraFrame& camera, DepthPlane& out) {
   std::array<double, 3> w;
@@ -63,16 +76,9 @@ bool snap_triangle(const PixelPoint& a, const PixelPoint& b, const PixelPoint& c
 }
 
 PixelWindow covered_box(const ScreenTriangle& triangle, const PixelWindow& window) {
-  const auto [x_min, x_max] = std::minmax({triangle.x_fx8[0], triangle.x_fx8[1], triangle.x_fx8[2]});
-  const auto [y_min, y_max] = std::minmax({triangle.y_fx8[0], triangle.y_fx8[1], triangle.y_fx8[2]});
-  // Pixel p has its centre at 256 p + 128: first p = ceil((min - 128) / 256), last p = floor((max - 128) / 256).
-  const auto clamp_x = [&](std::int32_t p) { return std::clamp<std::int64_t>(p, window.x0, window.x1); };
-  const auto clamp_y = [&](std::int32_t p) { return std::clamp<std::int64_t>(p, window.y0, window.y1); };
   PixelWindow box;
-  box.x0 = static_cast<std::uint32_t>(clamp_x((x_min + 127) >> 8));
-  box.x1 = static_cast<std::uint32_t>(std::max<std::int64_t>(box.x0, clamp_x(((x_max - 128) >> 8) + 1)));
-  box.y0 = static_cast<std::uint32_t>(clamp_y((y_min + 127) >> 8));
-  box.y1 = static_cast<std::uint32_t>(std::max<std::int64_t>(box.y0, clamp_y(((y_max - 128) >> 8) + 1)));
+  covered_range(triangle.x_fx8, window.x0, window.x1, box.x0, box.x1);
+  covered_range(triangle.y_fx8, window.y0, window.y1, box.y0, box.y1);
   return box;
 }
 

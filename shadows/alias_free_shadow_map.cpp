@@ -7,13 +7,14 @@
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/influence_region.h"
 #include "shadows/irregular_zbuffer.h"
+#include "shadows/solver.h"
 #include "shadows/visibility_kernel.h"
 
 namespace halfshade {
 namespace {
 
 constexpr std::size_t kTrianglesPerPart = 256;
-constexpr std::size_t kPartsPerRound = 64;  // bounds the memory of the spans
+constexpr std::size_t kPartsPerRound = 32;  // bounds the memory of the spans
 constexpr std::size_t kRowBlocks = 64;      // pieces of the grid, each written by one task
 
 /// Rows of the grid that one task owns: receivers list_begin..list_end of the sorted order.
@@ -146,10 +147,17 @@ void count_lists(const ViewLists& lists, ShadowStats& stats) {
   }
 }
 
+/// Position of one view among the views of a solve, for progress.
+struct ViewTurn {
+  std::size_t index, count;
+  double share(double done) const { return (static_cast<double>(index) + done) / static_cast<double>(count); }
+};
+
 /// All blockers against the receivers of one view. Rounds of triangles: first their spans, in parallel over triangles;
 /// then the tests, in parallel over blocks of rows, so that every mask has one writer.
 void solve_view(const LatticeMesh& mesh, const ReceiverArray& receivers, const KernelSamples& samples,
-                LightViewCells&& cells, VisibilityMasks& masks, ShadowStats& stats) {
+                LightViewCells&& cells, const ShadowConfig& config, ViewTurn turn, VisibilityMasks& masks,
+                ShadowStats& stats) {
   Stopwatch watch;
   const ViewLists lists = make_lists(std::move(cells));
   KernelReceivers kernel = gather_receivers(receivers, lists.zbuffer.entries, masks.words_per_receiver);
@@ -162,6 +170,7 @@ void solve_view(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
   stats.cull_ms += watch.lap();
   for (std::size_t first = 0; first < part_count; first += parts.size()) {
     const std::size_t active = std::min(parts.size(), part_count - first);
+    report_progress(config, turn.share(static_cast<double>(first) / static_cast<double>(part_count)));
     parallel_tasks(active, [&](std::size_t p) {
       const std::size_t begin = (first + p) * kTrianglesPerPart;
       find_spans(mesh, view_positions, lists, begin, std::min(mesh.triangles.size(), begin + kTrianglesPerPart), parts[p]);
@@ -203,7 +212,9 @@ void solve_alias_free_shadow_map(const LatticeMesh& mesh, const ReceiverArray& r
   const KernelSamples kernel_samples = make_kernel_samples(samples, bound);
   std::vector<LightViewCells> views = make_light_views(bound, samples, receivers, config.grid_resolution);
   stats.index_ms += watch.lap();
-  for (LightViewCells& view : views) solve_view(mesh, receivers, kernel_samples, std::move(view), masks, stats);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    solve_view(mesh, receivers, kernel_samples, std::move(views[i]), config, {i, views.size()}, masks, stats);
+  }
 }
 
 }  // namespace halfshade

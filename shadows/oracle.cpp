@@ -1,7 +1,10 @@
 #include "shadows/oracle.h"
 
+#include <algorithm>
+
 #include "rasterizer/core/parallel.h"
 #include "shadows/alpha.h"
+#include "shadows/solver.h"
 
 namespace halfshade {
 namespace {
@@ -44,14 +47,18 @@ void oracle_mask(const LatticeMesh& mesh, const ReceiverArray& receivers, std::s
 }
 
 void solve_oracle(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
-                  VisibilityMasks& masks) {
+                  const ShadowConfig& config, VisibilityMasks& masks) {
+  constexpr std::size_t kRound = 2048;  // receivers between two reports of progress
   masks.reset(receivers.size(), samples.count);
-  parallel_ranges(receivers.size(), 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) {
-      oracle_mask(mesh, receivers, i, samples,
-                  {masks.words.data() + i * masks.words_per_receiver, masks.words_per_receiver});
-    }
-  });
+  for (std::size_t first = 0; first < receivers.size(); first += kRound) {
+    report_progress(config, static_cast<double>(first) / static_cast<double>(receivers.size()));
+    parallel_ranges(std::min(kRound, receivers.size() - first), 16, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = first + begin; i != first + end; ++i) {
+        oracle_mask(mesh, receivers, i, samples,
+                    {masks.words.data() + i * masks.words_per_receiver, masks.words_per_receiver});
+      }
+    });
+  }
 }
 
 }  // namespace halfshade

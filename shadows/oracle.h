@@ -13,6 +13,6 @@ void oracle_mask(const LatticeMesh& mesh, const ReceiverArray& receivers, std::s
 
 /// The same for all receivers.
 void solve_oracle(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
-                  VisibilityMasks& masks);
+                  const ShadowConfig& config, VisibilityMasks& masks);
 
 }  // namespace halfshade

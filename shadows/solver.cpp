@@ -53,6 +53,10 @@ SamplePattern sample_pattern_from_name(const std::string& name) { return value_o
 const char* name_of(ShadowMethod method) { return name_in(kMethods, method); }
 const char* name_of(SamplePattern pattern) { return name_in(kPatterns, pattern); }
 
+void report_progress(const ShadowConfig& config, double done) {
+  if (config.progress && !config.progress(done)) throw Error(ErrorCode::kCancelled, "cancelled");
+}
+
 void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
   const FpEnvironment environment;
@@ -65,7 +69,7 @@ void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
       break;
     case ShadowMethod::kOracle: {
       Stopwatch watch;
-      solve_oracle(mesh, receivers, samples, masks);
+      solve_oracle(mesh, receivers, samples, config, masks);
       stats.test_ms = watch.lap();
       break;
     }

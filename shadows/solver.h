@@ -10,6 +10,9 @@ namespace halfshade {
 void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats);
 
+/// Calls config.progress if there is one; throws Error{kCancelled} when it returns false.
+void report_progress(const ShadowConfig& config, double done);
+
 /// "afsm", "oracle"; throws Error{kUsage} listing the known names.
 ShadowMethod shadow_method_from_name(const std::string& name);
 const char* name_of(ShadowMethod method);

@@ -1,6 +1,7 @@
 // Exact visibility of area lights: one bit for every (receiver, light sample).
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "halfshade/error.h"
@@ -28,6 +29,9 @@ struct ShadowConfig {
   std::uint32_t sample_sets = 1;                // 1..256 different sets, chosen per receiver by hash(pixel, seed)
   std::uint32_t seed = 0;                       // same seed, same bits, on every platform
   std::uint32_t grid_resolution = 0;            // afsm: cells per axis of the light view, 16..2048; 0 = chosen from the number of receivers
+  /// Called now and then on the calling thread with the share done, 0..1; returning false stops the work: the call
+  /// throws Error{kCancelled} and everything may be used again. May be empty.
+  std::function<bool(double done)> progress = nullptr;
 };
 
 /// Blocked masks of all receivers: bit i of a receiver's words is set where light sample i is hidden.

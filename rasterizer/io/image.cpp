@@ -101,6 +101,7 @@ void write_exr(const std::filesystem::path& path, std::uint32_t width, std::uint
     pixel_bytes += spec.channelformats.back().size();
   }
   spec.attribute("compression", "zip");
+  spec.attribute("DateTime", "");  // otherwise the writer stores the current time
   const std::size_t count = std::size_t{width} * height;
   std::vector<unsigned char> pixels(count * pixel_bytes);
   for (std::size_t c = 0; c < channels.size(); ++c)

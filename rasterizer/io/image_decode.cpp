@@ -1,5 +1,6 @@
 #include "rasterizer/io/image_decode.h"
 
+#include <array>
 #include <cstring>
 
 #include <OpenImageIO/filesystem.h>
@@ -31,19 +32,46 @@ const char* format_of(std::string_view bytes) {
   return "";
 }
 
-// All chunks up to IEND are there, and the pixels the header promises can come out of so many bytes: deflate expands at
-// most 1032 times, so a few bytes that claim a gigabyte are known for what they are before memory is set aside.
-bool is_whole_png(std::string_view bytes) {
+// The checksum of PNG chunks (ISO 3309), by the byte.
+std::uint32_t crc32(std::string_view bytes) {
+  static const std::array<std::uint32_t, 256> table = [] {
+    std::array<std::uint32_t, 256> values{};
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      std::uint32_t c = i;
+      for (int k = 0; k < 8; ++k) c = (c >> 1) ^ ((c & 1) != 0 ? 0xedb88320u : 0u);
+      values[i] = c;
+    }
+    return values;
+  }();
+  std::uint32_t crc = ~0u;
+  for (const char c : bytes) crc = (crc >> 8) ^ table[(crc ^ static_cast<unsigned char>(c)) & 0xff];
+  return ~crc;
+}
+
+// The pixels that the header promises can come out of so many bytes: deflate expands at most 1032 times, so a few bytes
+// that claim a gigabyte are known for what they are before memory is set aside.
+bool has_credible_png_header(std::string_view bytes) {
   constexpr std::uint64_t kMostExpansion = 1032;
+  constexpr std::uint32_t kLargestSide = 0x7fffffff;
+  constexpr std::uint32_t kChannelsOfColorType[7] = {1, 0, 3, 1, 2, 0, 4};
   if (bytes.size() < 33 || bytes.substr(12, 4) != "IHDR") return false;
-  constexpr std::uint32_t kChannelsOfColorType[8] = {1, 0, 3, 1, 2, 0, 4, 0};
-  const std::uint32_t bits = big_endian(bytes, 24, 1) * kChannelsOfColorType[big_endian(bytes, 25, 1) & 7];
-  const std::uint64_t row_bytes = (std::uint64_t{big_endian(bytes, 16, 4)} * bits + 7) / 8;
-  if (row_bytes * big_endian(bytes, 20, 4) / kMostExpansion > bytes.size()) return false;
+  const std::uint32_t width = big_endian(bytes, 16, 4), height = big_endian(bytes, 20, 4);
+  const std::uint32_t depth = big_endian(bytes, 24, 1), color_type = big_endian(bytes, 25, 1);
+  if (width == 0 || width > kLargestSide || height == 0 || height > kLargestSide || depth > 16 || color_type > 6) {
+    return false;
+  }
+  const std::uint64_t row_bytes = std::uint64_t{width} * depth * kChannelsOfColorType[color_type] / 8;
+  return row_bytes <= bytes.size() * kMostExpansion / height;
+}
+
+// All chunks up to IEND are there and undamaged. libpng would find that out too, but prints its complaints.
+bool is_whole_png(std::string_view bytes) {
+  if (!has_credible_png_header(bytes)) return false;
   for (std::size_t at = kPngMagic.size(); bytes.size() - at >= 12;) {
-    if (bytes.substr(at + 4, 4) == "IEND") return true;
     const std::uint32_t length = big_endian(bytes, at, 4);
     if (length > bytes.size() - at - 12) return false;
+    if (crc32(bytes.substr(at + 4, length + std::size_t{4})) != big_endian(bytes, at + 8 + length, 4)) return false;
+    if (bytes.substr(at + 4, 4) == "IEND") return true;
     at += 12 + std::size_t{length};
   }
   return false;

@@ -93,7 +93,7 @@ fs::path AssetRoot::resolve(const fs::path& base, std::string_view reference) co
   std::string name(reference);
   std::replace(name.begin(), name.end(), '\\', '/');
   std::error_code failure;
-  const fs::path resolved = fs::weakly_canonical(base / name, failure);
+  const fs::path resolved = fs::weakly_canonical(fs::absolute(base / name), failure);
   if (failure) throw Error(ErrorCode::kBadInput, fmt::format("{}: {}", in_quotes(reference), failure.message()));
   const auto differs = std::mismatch(root_.begin(), root_.end(), resolved.begin(), resolved.end());
   if (!allow_any_ && differs.first != root_.end()) {

@@ -1,5 +1,6 @@
 #include "rasterizer/io/obj_parser.h"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -201,9 +202,9 @@ class ObjParser {
       parts[count] = rest.substr(0, slash);
       rest.remove_prefix(more ? slash + 1 : rest.size());
     }
-    Corner corner{0, kNone, kNone};
-    corner.position = position_of_[parse_index(parts[0], "position", position_of_.size())];
-    if (corner.position-- == 0) throw lines_.error("face uses the wrong position in " + in_quotes(token));
+    const std::uint32_t position = position_of_[parse_index(parts[0], "position", position_of_.size())];
+    if (position == 0) throw lines_.error("face uses the wrong position in " + in_quotes(token));
+    Corner corner{position - 1, kNone, kNone};
     if (!parts[1].empty()) corner.uv = parse_index(parts[1], "texture", uvs_.size());
     if (!parts[2].empty()) corner.normal = parse_index(parts[2], "normal", normals_.size());
     const bool valid =

@@ -51,10 +51,16 @@ class ObjLoader {
     }
   }
 
+  // A file that is there but cannot be read is not missing: reading it gives the error.
+  static bool is_missing(const fs::path& path) {
+    std::error_code ignored;
+    return fs::status(path, ignored).type() == fs::file_type::not_found;
+  }
+
   // The line names one file that may hold blanks, or several files.
   void load_libraries(const FileReference& line) {
     const std::string& names = line.name;
-    if (names.find_first_of(" \t") == std::string::npos || fs::exists(resolve(file_, line, "mtllib"))) {
+    if (names.find_first_of(" \t") == std::string::npos || !is_missing(resolve(file_, line, "mtllib"))) {
       return load_library(line);
     }
     for (std::size_t begin = 0; begin != std::string::npos;) {
@@ -66,7 +72,7 @@ class ObjLoader {
 
   void load_library(const FileReference& reference) {
     const fs::path path = resolve(file_, reference, "mtllib");
-    if (!fs::exists(path)) return add_missing("mtllib", reference.name);
+    if (is_missing(path)) return add_missing("mtllib", reference.name);
     if (std::find(libraries_.begin(), libraries_.end(), path) != libraries_.end()) return;
     libraries_.push_back(path);
     const std::string text = read_regular_file(path, options_.max_file_bytes);
@@ -91,7 +97,7 @@ class ObjLoader {
                                 const char* keyword) {
     if (reference.name.empty()) return kNone;
     const fs::path path = resolve(library, reference, keyword);
-    if (fs::exists(path)) return textures_.request(path, kind);
+    if (!is_missing(path)) return textures_.request(path, kind);
     add_missing(keyword, reference.name);
     return kNone;
   }

@@ -15,6 +15,7 @@ namespace halfshade {
 namespace {
 
 using nlohmann::json;
+using nlohmann::ordered_json;
 
 constexpr std::size_t kMostSamples = 4096;
 constexpr std::uint64_t kMostFileBytes = std::uint64_t{16} << 20;
@@ -204,12 +205,12 @@ View read_view(const Node& root) {
 }
 
 template <class Vector>
-json to_array(const Vector& v) {
-  return json::array({v.x, v.y, v.z});
+ordered_json to_array(const Vector& v) {
+  return ordered_json::array({v.x, v.y, v.z});
 }
 
-nlohmann::ordered_json to_object(const Light& light) {
-  nlohmann::ordered_json object;
+ordered_json to_object(const Light& light) {
+  ordered_json object;
   object["name"] = light.name;
   object["type"] = kShapeNames[static_cast<std::size_t>(light.shape)];
   const bool is_flat = light.shape == LightShape::kRectangle || light.shape == LightShape::kDisk;
@@ -242,12 +243,12 @@ View load_view(const std::filesystem::path& file) {
 }
 
 std::string view_to_json(const View& view) {
-  nlohmann::ordered_json document;
+  ordered_json document;
   document["camera"] = {{"eye", to_array(view.camera.eye)},
                         {"target", to_array(view.camera.target)},
                         {"up", to_array(view.camera.up)},
                         {"fov_y_deg", view.camera.fov_y_deg}};
-  document["lights"] = nlohmann::ordered_json::array();
+  document["lights"] = ordered_json::array();
   for (const Light& light : view.lights) document["lights"].push_back(to_object(light));
   return document.dump(1) + "\n";
 }

@@ -100,9 +100,10 @@ void make_columns(std::uint32_t size, BuiltinScene& out) {
     builder.use(beam);
     builder.box({-0.5 * length - 0.5, 2.4, z - 0.2}, {0.5 * length + 0.5, 2.65, z + 0.2});
   }
-  out.view.camera = look({0.3 * length, 2.2 + 0.45 * length, 3.0 + 1.1 * length}, {0.0, 0.8, 0.4}, 45.0);
-  out.view.lights = {rectangle_light({-0.4 * length - 1.5, 5.5, -4.5}, {0.0, 1.0, 0.0}, 1.5, 1.5)};
   builder.finish();
+  const double d = std::max(length, 3.75);  // a short hall is looked at from as far away as one of four columns
+  out.view.camera = look({0.3 * d, 2.2 + 0.45 * d, 3.0 + 1.1 * d}, {0.0, 0.8, 0.4}, 45.0);
+  out.view.lights = {rectangle_light({-0.4 * d - 1.5, 5.5, -4.5}, {0.0, 1.0, 0.0}, 1.5, 1.5)};
 }
 
 void make_bars(std::uint32_t size, BuiltinScene& out) {

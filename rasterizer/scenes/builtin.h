@@ -15,9 +15,9 @@ struct BuiltinScene {
 };
 
 struct BuiltinInfo {
-  std::string_view name;         // "columns"
-  std::string_view description;  // one line
-  std::string_view size_meaning; // what SIZE scales, with its default
+  std::string_view name;          // "columns"
+  std::string_view description;   // one line
+  std::string_view size_meaning;  // what SIZE scales, with its default
 };
 
 std::span<const BuiltinInfo> builtin_scenes();

@@ -11,8 +11,8 @@ void make_cove(MeshBuilder& builder, std::uint32_t steps) {
   constexpr double kHalfWidth = 9.0, kFront = 7.0, kBend = -3.25, kRadius = 2.5, kTop = 8.0;
   std::vector<dvec2> profile{{kFront, 0.0}};  // (z, y)
   for (std::uint32_t i = 0; i <= steps; ++i) {
-    const CosSin angle = cos_sin_turns(0.25 * i / steps);
-    profile.push_back({kBend - kRadius * angle.sin, kRadius * (1.0 - angle.cos)});
+    const dvec2 angle = unit_circle(0.25 * i / steps);
+    profile.push_back({kBend - kRadius * angle.y, kRadius * (1.0 - angle.x)});
   }
   profile.push_back({kBend - kRadius, kTop});
   const std::uint32_t first = builder.vertex_count();
@@ -49,7 +49,7 @@ bool inside_leaf(double x, double y) {
   const double widest = y < 0.32 ? 1.0 - (0.32 - y) * (0.32 - y) * 6.5 : 1.0 - (y - 0.32) * (y - 0.32) * 2.16;
   if (side > 0.96 * widest) return false;
   if (side < 0.05) return true;
-  const double rib = (y - 0.30 * side) * 6.0;         // ribs lean towards the tip
+  const double rib = (y - 0.30 * side) * 6.0;          // ribs lean towards the tip
   const double between = rib - std::floor(rib) - 0.5;  // 0 half-way between two ribs
   const double slit = 0.22 * (side - 0.42);
   return std::fabs(between) > slit || y > 0.88;
@@ -73,8 +73,8 @@ AlphaMap leaf_texture() {
 void make_leaf(MeshBuilder& builder, const dvec3& root, std::uint32_t index, std::uint32_t stem, std::uint32_t leaf) {
   constexpr std::uint32_t kBends = 5;
   Random random(0x1eafu, index);
-  const CosSin heading = cos_sin_turns(index * 0.381966 + random.range(-0.03, 0.03));
-  const dvec3 out{heading.cos, 0.0, heading.sin}, across{-heading.sin, 0.0, heading.cos};
+  const dvec2 heading = unit_circle(index * 0.381966 + random.range(-0.03, 0.03));
+  const dvec3 out{heading.x, 0.0, heading.y}, across{-heading.y, 0.0, heading.x};
   const double height = 0.55 + 0.085 * index + random.range(-0.05, 0.05), spread = random.range(0.30, 0.55);
   std::vector<dvec3> path;
   for (std::uint32_t i = 0; i <= 6; ++i) {
@@ -87,8 +87,8 @@ void make_leaf(MeshBuilder& builder, const dvec3& root, std::uint32_t index, std
   const double length = random.range(0.55, 0.75), half = 0.42 * length;
   dvec3 spine = path.back();
   for (std::uint32_t i = 0; i < kBends; ++i) {
-    const CosSin droop = cos_sin_turns(0.05 - 0.05 * i);
-    const dvec3 next = spine + (out * droop.cos + dvec3{0.0, droop.sin, 0.0}) * (length / kBends);
+    const dvec2 droop = unit_circle(0.05 - 0.05 * i);
+    const dvec3 next = spine + (out * droop.x + dvec3{0.0, droop.y, 0.0}) * (length / kBends);
     const auto v0 = static_cast<float>(i) / kBends, v1 = static_cast<float>(i + 1) / kBends;
     builder.card(spine + across * half, spine - across * half, next - across * half, next + across * half, {0.0f, v0},
                  {1.0f, v1});
@@ -120,7 +120,7 @@ AlphaMap trellis_texture() {
   map.height = 64;
   for (std::uint32_t y = 0; y < 64; ++y) {
     for (std::uint32_t x = 0; x < 64; ++x) {
-      const bool rising = (x + y) % 32 < 6, falling = (x - y + 64) % 32 < 6;
+      const bool rising = (x + y) % 32 < 7, falling = (x - y + 64) % 32 < 7;
       map.alpha.push_back(rising || falling ? 255 : 0);
     }
   }
@@ -138,7 +138,7 @@ void make_trellis(MeshBuilder& builder, Scene& scene, const Placement& at) {
   const std::uint32_t laths = builder.material("laths", {0.56f, 0.38f, 0.22f});
   scene.materials[laths].alpha_map = static_cast<std::uint32_t>(scene.alpha_maps.size());
   scene.alpha_maps.push_back(trellis_texture());
-  builder.card({-0.92, 0.18, 0.0}, {0.92, 0.18, 0.0}, {0.92, 2.0, 0.0}, {-0.92, 2.0, 0.0}, {0.0f, 0.0f}, {4.0f, 4.0f});
+  builder.card({-0.92, 0.18, 0.0}, {0.92, 0.18, 0.0}, {0.92, 2.0, 0.0}, {-0.92, 2.0, 0.0}, {0.0f, 0.0f}, {2.5f, 2.5f});
 }
 
 /// Pins of rising length in a wooden sole.
@@ -150,15 +150,15 @@ void make_pins(MeshBuilder& builder, const Placement& at, std::uint32_t sides) {
   for (int i = 0; i < 9; ++i) {
     const double x = -0.72 + 0.18 * i, height = 0.45 + 0.011 * i * i + 0.02 * i;
     builder.tube(std::array{dvec3{x, 0.10, 0.0}, dvec3{x, height, 0.0}}, 0.014, 8);
-    builder.ellipsoid({x, height + 0.035, 0.0}, dvec3{0.04}, sides / 2, sides / 4);
+    builder.ellipsoid({x, height + 0.035, 0.0}, dvec3{0.04}, sides / 4 + 3, sides / 8 + 2);
   }
 }
 
 void make_knot_on_plinth(MeshBuilder& builder, const dvec3& foot, std::uint32_t sides) {
   builder.material("plinth", {0.84f, 0.82f, 0.78f});
   builder.place(place_at(foot));
-  const std::array plinth{dvec2{0.80, 0.0}, dvec2{0.80, 0.10}, dvec2{0.70, 0.14}, dvec2{0.70, 0.50},
-                          dvec2{0.76, 0.54}, dvec2{0.76, 0.62}};
+  const std::array plinth{dvec2{0.80, 0.0},  dvec2{0.80, 0.10}, dvec2{0.70, 0.14},
+                          dvec2{0.70, 0.50}, dvec2{0.76, 0.54}, dvec2{0.76, 0.62}};
   builder.lathe(plinth, 0.0, 0.62, 2 * sides);
   builder.material("knot", {0.05f, 0.34f, 0.42f});
   const std::uint32_t first_vertex = builder.vertex_count();
@@ -173,26 +173,26 @@ void make_demo(std::uint32_t size, BuiltinScene& out) {
   MeshBuilder builder(out.scene);
   builder.material("cove", {0.78f, 0.74f, 0.68f});
   make_cove(builder, size / 2);
-  make_knot_on_plinth(builder, {-0.15, 0.0, 0.0}, size);
+  make_knot_on_plinth(builder, {0.0, 0.0, -0.2}, size);
   builder.material("limestone", {0.78f, 0.72f, 0.62f});
-  make_column(builder, {-2.75, 0.0, -1.0}, 3.4, 0.27, size);
-  make_column(builder, {-1.75, 0.0, -2.1}, 2.7, 0.23, size);
-  make_column(builder, {-2.35, 0.0, 0.75}, 1.3, 0.23, size);
+  make_column(builder, {-2.55, 0.0, -1.5}, 3.4, 0.27, size);
+  make_column(builder, {-1.45, 0.0, -2.4}, 2.7, 0.23, size);
+  make_column(builder, {1.4, 0.0, -1.9}, 1.3, 0.23, size);
   builder.material("vermilion", {0.74f, 0.19f, 0.10f});
   builder.place({});
-  builder.ellipsoid({-1.30, 0.34, 1.85}, dvec3{0.34}, size, size / 2);
-  builder.ellipsoid({-2.35, 1.52, 0.75}, dvec3{0.22}, size, size / 2);
+  builder.ellipsoid({-0.55, 0.34, 1.95}, dvec3{0.34}, size, size / 2);
+  builder.ellipsoid({1.4, 1.52, -1.9}, dvec3{0.22}, size, size / 2);
   builder.material("ivory", {0.86f, 0.82f, 0.72f});
-  builder.ellipsoid({-0.62, 0.20, 2.15}, dvec3{0.20}, size, size / 2);
+  builder.ellipsoid({0.20, 0.20, 2.2}, dvec3{0.20}, size, size / 2);
   builder.material("mustard", {0.82f, 0.55f, 0.10f});
-  builder.ellipsoid({-1.86, 0.14, 2.35}, dvec3{0.14}, size, size / 2);
-  make_pins(builder, place_at({1.25, 0.0, 1.75}, 0.04), size / 2);
-  make_plant(builder, out.scene, {2.05, 0.0, 0.15}, size);
-  make_trellis(builder, out.scene, place_at({1.15, 0.0, -1.9}, -0.07));
+  builder.ellipsoid({-1.05, 0.14, 2.6}, dvec3{0.14}, size, size / 2);
+  make_pins(builder, place_at({1.75, 0.0, 1.75}, 0.04), size);
+  make_plant(builder, out.scene, {2.42, 0.0, -0.35}, size);
+  make_trellis(builder, out.scene, place_at({-2.15, 0.0, 0.9}, 0.145, 0.78));
   builder.smooth(0);
   builder.finish();
-  out.view.camera = look({0.9, 3.3, 8.6}, {-0.05, 1.05, -0.1}, 38.0);
-  out.view.lights = {rectangle_light({-4.8, 6.2, -0.6}, {0.0, 0.6, 0.2}, 1.6, 1.6)};
+  out.view.camera = look({0.6, 4.3, 8.6}, {0.0, 0.95, 0.0}, 38.0);
+  out.view.lights = {rectangle_light({-5.2, 6.0, 0.0}, {0.0, 0.6, 0.2}, 1.25, 1.25)};
 }
 
 }  // namespace halfshade

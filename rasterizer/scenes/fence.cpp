@@ -1,8 +1,9 @@
 // One picket fence twice: `fence` is a card with an opacity texture, `fence_mesh` the same shape as triangles.
 //
-// Both are made from the rectangles below, in texels of one period of the fence. All coordinates are small multiples of a
-// power of two, so that they are exact in float and on the lattice: the two scenes cast the same shadow bit for bit, save
-// for segments through the very border of a rectangle (there a texel owns its low edge only, a triangle all its edges).
+// Both are made from the rectangles below, in texels of one period of the fence. All coordinates are small multiples of
+// a power of two, so that they are exact in float and on the lattice: the two scenes cast the same shadow bit for bit,
+// save for segments through the very border of a rectangle (there a texel owns its low edge only, a triangle all its
+// edges).
 #include <bit>
 
 #include "rasterizer/scenes/mesh_builder.h"
@@ -19,9 +20,9 @@ struct TexelRect {
 };
 
 constexpr std::array kOpaque{
-    TexelRect{4, 12, 0, 56},  TexelRect{5, 11, 56, 58}, TexelRect{6, 10, 58, 60}, TexelRect{7, 9, 60, 62},
-    TexelRect{0, 4, 12, 17},  TexelRect{12, 16, 12, 17},  // lower rail left and right of the picket
-    TexelRect{0, 4, 42, 47},  TexelRect{12, 16, 42, 47},
+    TexelRect{4, 12, 0, 56}, TexelRect{5, 11, 56, 58},  TexelRect{6, 10, 58, 60}, TexelRect{7, 9, 60, 62},
+    TexelRect{0, 4, 12, 17}, TexelRect{12, 16, 12, 17},  // lower rail left and right of the picket
+    TexelRect{0, 4, 42, 47}, TexelRect{12, 16, 42, 47},
 };
 
 AlphaMap fence_texture() {

@@ -44,11 +44,8 @@ dvec3 unit_or_zero(const dvec3& v) {
 }  // namespace
 
 Placement place_at(const dvec3& origin, double turns, double scale) {
-  const CosSin angle = cos_sin_turns(turns);
-  return {origin,
-          dvec3{angle.cos, 0.0, -angle.sin} * scale,
-          dvec3{0.0, scale, 0.0},
-          dvec3{angle.sin, 0.0, angle.cos} * scale};
+  const dvec2 angle = unit_circle(turns);
+  return {origin, dvec3{angle.x, 0.0, -angle.y} * scale, dvec3{0.0, scale, 0.0}, dvec3{angle.y, 0.0, angle.x} * scale};
 }
 
 dvec3 perpendicular(const dvec3& v) {
@@ -139,8 +136,8 @@ void MeshBuilder::lathe(std::span<const dvec2> profile, double bottom, double to
   const auto rings = static_cast<std::uint32_t>(profile.size());
   for (const dvec2& point : profile) {
     for (std::uint32_t side = 0; side < sides; ++side) {
-      const CosSin angle = cos_sin_turns(fraction(side, sides));
-      vertex({point.x * angle.sin, point.y, point.x * angle.cos});
+      const dvec2 angle = unit_circle(fraction(side, sides));
+      vertex({point.x * angle.y, point.y, point.x * angle.x});
     }
   }
   join_rings(first, rings, sides, false);
@@ -156,8 +153,8 @@ void MeshBuilder::cylinder(double radius, double bottom, double top, std::uint32
 void MeshBuilder::ellipsoid(const dvec3& center, const dvec3& radii, std::uint32_t sides, std::uint32_t bands) {
   std::vector<dvec2> profile;
   for (std::uint32_t band = 1; band < bands; ++band) {
-    const CosSin angle = cos_sin_turns(0.5 * fraction(band, bands));
-    profile.push_back({angle.sin, -angle.cos});
+    const dvec2 angle = unit_circle(0.5 * fraction(band, bands));
+    profile.push_back({angle.y, -angle.x});
   }
   const Placement outer = placement_;
   placement_ = {outer(center), outer.x * radii.x, outer.y * radii.y, outer.z * radii.z};
@@ -168,8 +165,8 @@ void MeshBuilder::ellipsoid(const dvec3& center, const dvec3& radii, std::uint32
 void MeshBuilder::tube_ring(const dvec3& center, const dvec3& normal, const dvec3& binormal, double radius,
                             std::uint32_t sides) {
   for (std::uint32_t side = 0; side < sides; ++side) {
-    const CosSin angle = cos_sin_turns(fraction(side, sides));
-    vertex(center + (normal * angle.cos + binormal * angle.sin) * radius);
+    const dvec2 angle = unit_circle(fraction(side, sides));
+    vertex(center + (normal * angle.x + binormal * angle.y) * radius);
   }
 }
 
@@ -190,14 +187,14 @@ void MeshBuilder::tube(std::span<const dvec3> path, double radius, std::uint32_t
 void MeshBuilder::torus_knot(double major, double minor, double radius, std::uint32_t rings, std::uint32_t sides) {
   const std::uint32_t first = vertex_count();
   for (std::uint32_t ring = 0; ring < rings; ++ring) {
-    const CosSin around = cos_sin_turns(2.0 * fraction(ring, rings));   // about the axis
-    const CosSin through = cos_sin_turns(3.0 * fraction(ring, rings));  // through the hole
-    const double reach = major + minor * through.cos;
+    const dvec2 around = unit_circle(2.0 * fraction(ring, rings));   // about the axis
+    const dvec2 through = unit_circle(3.0 * fraction(ring, rings));  // through the hole
+    const double reach = major + minor * through.x;
     // The torus' own normal is at right angles to any curve on it, so it serves as the first axis of the cross section.
-    const dvec3 normal{through.cos * around.cos, through.cos * around.sin, through.sin};
-    const dvec3 along{-3.0 * minor * through.sin * around.cos - 2.0 * reach * around.sin,
-                      -3.0 * minor * through.sin * around.sin + 2.0 * reach * around.cos, 3.0 * minor * through.cos};
-    const dvec3 center{reach * around.cos, reach * around.sin, minor * through.sin};
+    const dvec3 normal{through.x * around.x, through.x * around.y, through.y};
+    const dvec3 along{-3.0 * minor * through.y * around.x - 2.0 * reach * around.y,
+                      -3.0 * minor * through.y * around.y + 2.0 * reach * around.x, 3.0 * minor * through.x};
+    const dvec3 center{reach * around.x, reach * around.y, minor * through.y};
     tube_ring(center, normal, unit_or_zero(glm::cross(along, normal)), radius, sides);
   }
   join_rings(first, rings, sides, true);

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "halfshade/scene.h"
-#include "rasterizer/scenes/fixed_math.h"
+#include "rasterizer/scenes/random.h"
 
 namespace halfshade {
 

@@ -6,16 +6,16 @@
 
 namespace halfshade {
 
-void make_demo(std::uint32_t size, BuiltinScene& out);         // demo.cpp
-void make_columns(std::uint32_t size, BuiltinScene& out);      // architecture.cpp
+void make_demo(std::uint32_t size, BuiltinScene& out);     // demo.cpp
+void make_columns(std::uint32_t size, BuiltinScene& out);  // architecture.cpp
 void make_bars(std::uint32_t size, BuiltinScene& out);
 void make_room(std::uint32_t size, BuiltinScene& out);
-void make_fence(std::uint32_t size, BuiltinScene& out);        // fence.cpp
+void make_fence(std::uint32_t size, BuiltinScene& out);  // fence.cpp
 void make_fence_mesh(std::uint32_t size, BuiltinScene& out);
-void make_torus_knot(std::uint32_t size, BuiltinScene& out);   // solids.cpp
+void make_torus_knot(std::uint32_t size, BuiltinScene& out);  // solids.cpp
 void make_sphere(std::uint32_t size, BuiltinScene& out);
 void make_field(std::uint32_t size, BuiltinScene& out);
-void make_grass(std::uint32_t size, BuiltinScene& out);        // strands.cpp
+void make_grass(std::uint32_t size, BuiltinScene& out);  // strands.cpp
 void make_hairball(std::uint32_t size, BuiltinScene& out);
 
 /// One-sided rectangle that faces `target`.

@@ -59,7 +59,7 @@ void make_field(std::uint32_t size, BuiltinScene& out) {
   MeshBuilder builder(out.scene);
   const double n = size;
   builder.material("meadow", {0.36f, 0.46f, 0.22f});
-  builder.ground(n);
+  builder.ground(std::max(n, 3.0));
   const std::uint32_t skin = builder.material("skin", {0.12f, 0.10f, 0.09f});
   const std::uint32_t white = builder.material("white wool", {0.82f, 0.79f, 0.72f});
   const std::uint32_t brown = builder.material("brown wool", {0.42f, 0.26f, 0.15f});
@@ -73,8 +73,9 @@ void make_field(std::uint32_t size, BuiltinScene& out) {
   }
   builder.smooth(first_triangle);
   builder.finish();
-  out.view.camera = look({0.0, 1.3 * n, 1.35 * n}, {0.0, 0.0, 0.1 * n}, 48.0);
-  out.view.lights = {rectangle_light({-0.8 * n, 1.1 * n, -0.25 * n}, {0.0, 0.0, 0.0}, 0.45 * n, 0.45 * n)};
+  const double d = std::max(n, 3.0);  // a few animals are looked at from no nearer than nine
+  out.view.camera = look({0.0, 1.3 * d, 1.35 * d}, {0.0, 0.0, 0.1 * d}, 48.0);
+  out.view.lights = {rectangle_light({-0.8 * d, 1.1 * d, -0.25 * d}, {0.0, 0.0, 0.0}, 0.45 * d, 0.45 * d)};
 }
 
 }  // namespace halfshade

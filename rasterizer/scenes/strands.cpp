@@ -1,5 +1,5 @@
-// Many thin things: `grass` (open blades) and `hairball` (closed tubes). Each strand is a pure function of its index and
-// has its own place in the arrays, so strands are made in parallel and tens of millions of triangles take seconds.
+// Many thin things: `grass` (open blades) and `hairball` (closed tubes). Each strand is a pure function of its index
+// and has its own place in the arrays, so strands are made in parallel and tens of millions of triangles take seconds.
 #include <algorithm>
 
 #include "rasterizer/core/parallel.h"
@@ -33,10 +33,10 @@ void make_blade(std::uint32_t index, std::uint32_t columns, dvec3* positions) {
   const double pitch = kLawnSide / columns;
   const double x = (index % columns + random.uniform()) * pitch - 0.5 * kLawnSide;
   const double z = (index / columns + random.uniform()) * pitch - 0.5 * kLawnSide;
-  const CosSin heading = cos_sin_turns(random.uniform());
+  const dvec2 heading = unit_circle(random.uniform());
   const double height = random.range(0.30, 0.62), bend = random.range(0.05, 0.34);
   const double half_width = std::min(0.016, 0.35 * pitch) * random.range(0.7, 1.3);
-  const dvec3 root{x, 0.0, z}, forward{heading.cos, 0.0, heading.sin}, across{-heading.sin, 0.0, heading.cos};
+  const dvec3 root{x, 0.0, z}, forward{heading.x, 0.0, heading.y}, across{-heading.y, 0.0, heading.x};
   for (std::uint32_t pair = 0; pair < 3; ++pair) {
     const double t = pair * 0.34;
     const dvec3 spine = root + forward * (bend * t * t) + dvec3{0.0, height * t * (1.0 - 0.2 * t), 0.0};
@@ -65,8 +65,8 @@ void make_hair(std::uint32_t index, const dvec3& center, dvec3* positions) {
     const dvec3 binormal = glm::cross(along, normal);
     const double taper = radius * (1.0 - 0.1 * ring);
     for (std::uint32_t side = 0; side < kHairSides; ++side) {
-      const CosSin angle = cos_sin_turns(side / 3.0);
-      positions[ring * kHairSides + side] = point + (normal * angle.cos + binormal * angle.sin) * taper;
+      const dvec2 angle = unit_circle(side / 3.0);
+      positions[ring * kHairSides + side] = point + (normal * angle.x + binormal * angle.y) * taper;
     }
     along += glm::cross(curl, along) + dvec3{0.0, -0.10, 0.0};
     along /= std::sqrt(glm::dot(along, along));

@@ -1,0 +1,212 @@
+#include "dump.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+
+#include "halfshade/error.h"
+#include "rasterizer/io/atomic_file.h"
+#include "rasterizer/io/npy.h"
+
+namespace halfshade {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<double> flatten(std::span<const vec3> points) {
+  std::vector<double> values;
+  values.reserve(points.size() * 3);
+  for (const vec3& p : points) values.insert(values.end(), {p.x, p.y, p.z});
+  return values;
+}
+
+template <class T>
+void write_array(const fs::path& directory, const char* name, const char* dtype, std::vector<std::size_t> shape,
+                 const std::vector<T>& values) {
+  write_npy(directory / name, dtype, shape, values.data());
+}
+
+/// Masks as bytes: bit i % 8 of byte i / 8 is sample i. Words are little-endian, so this only drops the padding.
+std::vector<std::uint8_t> mask_bytes(const VisibilityMasks& masks) {
+  const std::size_t bytes = (masks.sample_count + 7) / 8;
+  std::vector<std::uint8_t> result(masks.receiver_count * bytes);
+  for (std::size_t r = 0; r < masks.receiver_count; ++r) {
+    for (std::size_t b = 0; b < bytes; ++b) {
+      result[r * bytes + b] = static_cast<std::uint8_t>(masks.mask(r)[b / 8] >> (b % 8 * 8));
+    }
+  }
+  return result;
+}
+
+void write_triangles(const fs::path& directory, const LatticeMesh& mesh) {
+  std::vector<vec3> corners;
+  corners.reserve(mesh.triangles.size() * 3);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const vec3& p : mesh.corners(t)) corners.push_back(p);
+  }
+  write_array(directory, "triangles.npy", "f8", {mesh.triangles.size(), 3, 3}, flatten(corners));
+}
+
+/// Texture coordinates, texture number per triangle, the textures; only for scenes with alpha-tested triangles.
+void write_alpha(const fs::path& directory, const LatticeMesh& mesh, nlohmann::ordered_json& about) {
+  const Scene& scene = *mesh.scene;
+  if (scene.alpha_maps.empty() || scene.triangle_uvs.empty()) return;
+  std::vector<float> uvs;
+  std::vector<std::int32_t> map_of_triangle;
+  std::vector<float> cutoffs(scene.alpha_maps.size(), 0.5f);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const vec2& uv : scene.triangle_uvs[t]) uvs.insert(uvs.end(), {uv.x, uv.y});
+    const std::uint32_t map = mesh.alpha_map(t);
+    map_of_triangle.push_back(map == kNone ? -1 : static_cast<std::int32_t>(map));
+    if (map != kNone) cutoffs[map] = scene.materials[scene.triangle_materials[t]].alpha_cutoff;
+  }
+  write_array(directory, "triangle_uvs.npy", "f4", {mesh.triangles.size(), 3, 2}, uvs);
+  write_array(directory, "triangle_alpha.npy", "i4", {mesh.triangles.size()}, map_of_triangle);
+  for (std::size_t k = 0; k < scene.alpha_maps.size(); ++k) {
+    const AlphaMap& map = scene.alpha_maps[k];
+    write_array(directory, fmt::format("alpha_{}.npy", k).c_str(), "u1", {map.height, map.width}, map.alpha);
+  }
+  about["alpha_cutoffs"] = cutoffs;
+}
+
+NpyArray read_array(const fs::path& directory, const std::string& name, const std::vector<std::size_t>& shape) {
+  NpyArray array = read_npy(directory / name);
+  bool fits = array.shape.size() == shape.size();
+  for (std::size_t k = 0; fits && k < shape.size(); ++k) fits = shape[k] == 0 || shape[k] == array.shape[k];
+  if (fits) return array;
+  throw Error(ErrorCode::kBadInput, fmt::format("{}: the array's shape is ({}), expected ({}) (0 = any)",
+                                                (directory / name).string(), fmt::join(array.shape, ", "), fmt::join(shape, ", ")));
+}
+
+/// Lattice points; anything off the lattice is not a dump of ours.
+std::vector<vec3> read_points(const fs::path& directory, const std::string& name, const std::vector<std::size_t>& shape) {
+  const NpyArray array = read_array(directory, name, shape);
+  const std::span<const double> values = array.as<double>();
+  std::vector<vec3> points(values.size() / 3);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double x = values[i];
+    if (!(x >= -2.0 && x <= 2.0) || static_cast<double>(snap_to_lattice(x)) != x) {
+      throw Error(ErrorCode::kBadInput, fmt::format("{}: value {} at {} is not on the lattice of 2^-38 in [-2, 2]",
+                                                    (directory / name).string(), x, i));
+    }
+    points[i / 3][static_cast<int>(i % 3)] = static_cast<float>(x);
+  }
+  return points;
+}
+
+template <class T>
+std::vector<T> read_values(const fs::path& directory, const std::string& name, const std::vector<std::size_t>& shape) {
+  const NpyArray array = read_array(directory, name, shape);
+  const std::span<const T> values = array.as<T>();
+  return {values.begin(), values.end()};
+}
+
+nlohmann::ordered_json read_about(const fs::path& directory) {
+  std::ifstream file(directory / "dump.json");
+  if (!file) throw Error(ErrorCode::kBadInput, fmt::format("{}: cannot be opened", (directory / "dump.json").string()));
+  try {
+    return nlohmann::ordered_json::parse(file);
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ErrorCode::kBadInput, fmt::format("{}: {}", (directory / "dump.json").string(), e.what()));
+  }
+}
+
+void read_alpha(const fs::path& directory, Dump& dump) {
+  const std::size_t triangles = dump.mesh.triangles.size();
+  dump.scene.triangle_materials.assign(triangles, 0);
+  dump.scene.materials.resize(1);
+  if (!fs::exists(directory / "triangle_alpha.npy")) return;
+  const auto uvs = read_values<float>(directory, "triangle_uvs.npy", {triangles, 3, 2});
+  const auto map_of_triangle = read_values<std::int32_t>(directory, "triangle_alpha.npy", {triangles});
+  const auto cutoffs = dump.about.at("alpha_cutoffs").get<std::vector<float>>();
+  for (std::size_t k = 0; k < cutoffs.size(); ++k) {
+    const std::string name = fmt::format("alpha_{}.npy", k);
+    const NpyArray texels = read_array(directory, name, {0, 0});
+    const auto values = texels.as<std::uint8_t>();
+    dump.scene.alpha_maps.push_back({name, static_cast<std::uint32_t>(texels.shape[1]),
+                                     static_cast<std::uint32_t>(texels.shape[0]), {values.begin(), values.end()}});
+    Material material;
+    material.alpha_map = static_cast<std::uint32_t>(k);
+    material.alpha_cutoff = cutoffs[k];
+    dump.scene.materials.push_back(material);
+  }
+  for (std::size_t t = 0; t < triangles; ++t) {
+    if (map_of_triangle[t] < -1 || map_of_triangle[t] >= static_cast<std::int32_t>(cutoffs.size())) {
+      throw Error(ErrorCode::kBadInput, fmt::format("triangle_alpha.npy: texture {} of triangle {} is not in -1..{}",
+                                                    map_of_triangle[t], t, static_cast<int>(cutoffs.size()) - 1));
+    }
+    dump.scene.triangle_materials[t] = static_cast<std::uint32_t>(map_of_triangle[t] + 1);
+    const float* p = &uvs[t * 6];
+    dump.scene.triangle_uvs.push_back({vec2(p[0], p[1]), vec2(p[2], p[3]), vec2(p[4], p[5])});
+  }
+}
+
+void read_masks(const fs::path& directory, std::uint32_t samples, Dump& dump) {
+  const std::size_t bytes = (samples + 7) / 8, receivers = dump.receivers.size();
+  const auto values = read_values<std::uint8_t>(directory, "masks.npy", {receivers, bytes});
+  dump.masks.reset(receivers, samples);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t r = i / bytes, b = i % bytes;
+    dump.masks.words[r * dump.masks.words_per_receiver + b / 8] |= std::uint64_t{values[i]} << (b % 8 * 8);
+  }
+}
+
+}  // namespace
+
+void write_dump(const fs::path& directory, const LatticeMesh& mesh, const ReceiverArray& receivers,
+                const std::vector<std::uint32_t>& receiver_pixels, const LightSamples& samples,
+                const VisibilityMasks& masks, nlohmann::ordered_json about) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", directory.string(), error.message()));
+  fs::remove(directory / "dump.json", error);  // written last: a dump with it is complete
+  const std::size_t count = receivers.size();
+  write_array(directory, "receivers.npy", "f8", {count, 3}, flatten(receivers.position));
+  write_array(directory, "receiver_normals.npy", "f4", {count, 3}, receivers.normal);
+  write_array(directory, "receiver_pixels.npy", "u4", {count}, receiver_pixels);
+  write_array(directory, "receiver_triangles.npy", "u4", {count}, receivers.triangle);
+  write_array(directory, "receiver_sets.npy", "u1", {count}, receivers.set);
+  write_array(directory, "light_samples.npy", "f8", {samples.sets, samples.count, 3}, flatten(samples.points));
+  write_array(directory, "masks.npy", "u1", {count, (masks.sample_count + 7) / 8}, mask_bytes(masks));
+  write_triangles(directory, mesh);
+  write_alpha(directory, mesh, about);
+  const LocalFrame& frame = mesh.frame;
+  const dvec3 center = frame.center();
+  about["frame"] = {{"center", {center.x, center.y, center.z}},
+                    {"box_min", {frame.box_min.x, frame.box_min.y, frame.box_min.z}},
+                    {"half_extent", {frame.half_extent.x, frame.half_extent.y, frame.half_extent.z}},
+                    {"scale", frame.scale}};
+  about["counts"] = {{"receivers", count}, {"triangles", mesh.triangles.size()}, {"samples", samples.count}, {"sets", samples.sets}};
+  about["mask_hash"] = masks.hash();
+  write_file_atomically(directory / "dump.json", about.dump(2) + "\n");
+}
+
+void read_dump(const fs::path& directory, Dump& dump) {
+  dump.about = read_about(directory);
+  dump.mesh.positions = read_points(directory, "triangles.npy", {0, 3, 3});
+  dump.mesh.triangles.resize(dump.mesh.positions.size() / 3);
+  for (std::uint32_t t = 0; t < dump.mesh.triangles.size(); ++t) dump.mesh.triangles[t] = {3 * t, 3 * t + 1, 3 * t + 2};
+  try {
+    read_alpha(directory, dump);
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ErrorCode::kBadInput, fmt::format("{}: {}", (directory / "dump.json").string(), e.what()));
+  }
+  dump.mesh.scene = &dump.scene;
+  dump.receivers.position = read_points(directory, "receivers.npy", {0, 3});
+  const std::size_t count = dump.receivers.size();
+  dump.receivers.triangle = read_values<std::uint32_t>(directory, "receiver_triangles.npy", {count});
+  dump.receivers.set = read_values<std::uint8_t>(directory, "receiver_sets.npy", {count});
+  dump.receivers.sample = read_values<std::uint32_t>(directory, "receiver_pixels.npy", {count});
+  dump.samples.points = read_points(directory, "light_samples.npy", {0, 0, 3});
+  const NpyArray samples = read_npy(directory / "light_samples.npy");
+  dump.samples.sets = static_cast<std::uint32_t>(samples.shape[0]);
+  dump.samples.count = static_cast<std::uint32_t>(samples.shape[1]);
+  for (const std::uint8_t set : dump.receivers.set) {
+    if (set >= dump.samples.sets) {
+      throw Error(ErrorCode::kBadInput, fmt::format("receiver_sets.npy: set {} is not in 0..{}", set, dump.samples.sets - 1));
+    }
+  }
+  read_masks(directory, dump.samples.count, dump);
+}
+
+}  // namespace halfshade

@@ -1,0 +1,29 @@
+// Progress on standard error, and the signals that stop the work.
+#pragma once
+
+#include <string>
+
+#include "halfshade/shadows.h"
+
+namespace halfshade {
+
+/// SIGINT and SIGTERM set a flag that the progress callback reads; a second one ends the program at once.
+void install_signal_handlers();
+/// The signal received, or 0.
+int stop_signal();
+
+/// A bar on a terminal, a line each 10 % elsewhere.
+class Progress {
+ public:
+  explicit Progress(std::string label, bool quiet);
+  ~Progress();
+  /// For ShadowConfig::progress: false once a signal has arrived.
+  bool operator()(double done);
+
+ private:
+  std::string label_;
+  bool quiet_, terminal_;
+  int last_tenth_ = 0;
+};
+
+}  // namespace halfshade

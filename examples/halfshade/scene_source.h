@@ -1,0 +1,24 @@
+// Where a scene comes from: an OBJ file with its view beside it, or a built-in scene.
+#pragma once
+
+#include <string>
+
+#include "halfshade/light.h"
+#include "rasterizer/io/obj_scene.h"
+
+namespace halfshade {
+
+struct SceneSource {
+  Scene scene;
+  View view;
+  ObjLoadReport report;
+  bool view_was_made_up = false;  // no view file: camera and light were fitted to the scene
+};
+
+/// `name` is "builtin:NAME", "builtin:NAME:SIZE" or a path; `view_file` overrides the view. Throws Error.
+SceneSource load_scene(const std::string& name, const std::string& view_file, const ObjLoadOptions& options);
+
+/// XXH3-128 over geometry, uvs, materials and textures, as 32 hexadecimal digits.
+std::string scene_hash(const Scene& scene);
+
+}  // namespace halfshade
