@@ -78,10 +78,12 @@ KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vect
   return k;
 }
 
-void scatter_masks(const KernelReceivers& k, const std::vector<std::uint32_t>& order, VisibilityMasks& masks) {
+void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const std::vector<std::uint32_t>& order,
+                   VisibilityMasks& masks) {
   parallel_ranges(order.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      std::copy_n(k.masks.begin() + i * k.words, k.words, masks.words.begin() + order[i] * masks.words_per_receiver);
+      restore_sample_order(samples, {k.masks.data() + i * k.words, k.words},
+                           {masks.words.data() + order[i] * k.words, k.words});
     }
   });
 }
@@ -181,7 +183,7 @@ void solve_view(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
     });
     stats.test_ms += watch.lap();
   }
-  scatter_masks(kernel, lists.zbuffer.entries, masks);
+  scatter_masks(kernel, samples, lists.zbuffer.entries, masks);
   KernelCounters total;
   for (const KernelCounters& c : counters) total.add(c);
   for (const PartSpans& part : parts) {

@@ -147,4 +147,44 @@ std::array<std::uint32_t, 2> texel_at_hit(const AlphaTriangle& triangle, const v
   return {column, height - 1 - up};
 }
 
+AlphaLookup::AlphaLookup(const AlphaTriangle& triangle, const vec3& receiver) : triangle_(triangle), receiver_(receiver) {
+  const auto norm1 = [](const dvec3& v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); };
+  const dvec3 origin(receiver);
+  double size = 0.0, reach = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const dvec3 a = dvec3(triangle.corners[(i + 1) % 3]) - origin, b = dvec3(triangle.corners[(i + 2) % 3]) - origin;
+    const dvec3 weight = glm::cross(a, b);
+    const double u = static_cast<double>(triangle.u[i]) * (triangle.map->width / kUvUnitsPerOne);
+    const double v = static_cast<double>(triangle.v[i]) * (triangle.map->height / kUvUnitsPerOne);
+    u_ += weight * u, v_ += weight * v, sum_ += weight;
+    size += norm1(a) * norm1(b);
+    reach = std::max({reach, std::fabs(u), std::fabs(v)});
+  }
+  // Each term is a product of three or four factors with one rounding each, summed: below 12 units of 2^-53 of the sum
+  // of magnitudes, for numerator (times the largest coordinate) and denominator alike; 16 with room.
+  error_ = 16.0 * 0x1p-53 * size;
+  texel_reach_ = reach;
+}
+
+bool AlphaLookup::opaque(const vec3& l, std::uint64_t& exact_fallbacks) const {
+  const dvec3 s = dvec3(l) - dvec3(receiver_);
+  const double sum = glm::dot(sum_, s), spread = error_ * (std::fabs(s.x) + std::fabs(s.y) + std::fabs(s.z));
+  const double error = texel_reach_ * (2.0 * spread / std::fabs(sum) + 8.0 * 0x1p-53) * 2.0;
+  const double u = glm::dot(u_, s) / sum, v = glm::dot(v_, s) / sum;
+  const double column = std::floor(u), up = std::floor(v);
+  const double from_border = std::min({u - column, column + 1.0 - u, v - up, up + 1.0 - v});
+  if (!(std::fabs(sum) > 4.0 * spread && from_border > error)) {
+    return opaque_at_hit(triangle_, receiver_, l, &exact_fallbacks);
+  }
+  const AlphaMap& map = *triangle_.map;
+  const std::uint32_t x = wrap(static_cast<std::int64_t>(column), map.width);
+  const std::uint32_t y = map.height - 1 - wrap(static_cast<std::int64_t>(up), map.height);
+  return map.alpha[std::size_t{y} * map.width + x] >= triangle_.threshold;
+}
+
+bool opaque_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l, std::uint64_t* exact_fallbacks) {
+  const auto [column, row] = texel_at_hit(triangle, r, l, exact_fallbacks);
+  return triangle.map->alpha[std::size_t{row} * triangle.map->width + column] >= triangle.threshold;
+}
+
 }  // namespace halfshade

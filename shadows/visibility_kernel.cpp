@@ -1,5 +1,6 @@
 #include "shadows/visibility_kernel.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "shadows/visibility_pair.h"
@@ -153,12 +154,40 @@ HWY_INLINE Vec PlaneValue(const ScaledPlanes& s, int k, Vec x, Vec y, Vec z) {
                     hn::MulAdd(hn::Set(d, s.my[k]), y, hn::MulAdd(hn::Set(d, s.mz[k]), z, hn::Set(d, s.d[k]))));
 }
 
-/// 64 samples against the planes: bits certainly inside, and bits that are not certainly outside.
-HWY_INLINE void TestWord(const ScaledPlanes& s, const float* x, const float* y, const float* z, std::uint64_t& inside,
-                         std::uint64_t& possible) {
+/// Which groups of samples the planes cut, and which lie inside all of them; one bit per group of [first, first + 64).
+struct GroupBits {
+  std::uint64_t possible = 0, inside = 0;
+};
+
+HWY_INLINE GroupBits TestGroups(const ScaledPlanes& s, const KernelSamples& samples, std::size_t first, std::uint64_t open) {
+  const Tag d;
+  GroupBits bits;
+  for (std::size_t i = 0; i < 64 && open >> i != 0; i += hn::Lanes(d)) {
+    const std::size_t g = first + i;
+    const Vec x = hn::LoadU(d, &samples.group_x[g]), y = hn::LoadU(d, &samples.group_y[g]), z = hn::LoadU(d, &samples.group_z[g]);
+    const Vec hx = hn::LoadU(d, &samples.half_x[g]), hy = hn::LoadU(d, &samples.half_y[g]), hz = hn::LoadU(d, &samples.half_z[g]);
+    Vec lowest = hn::Set(d, 1e30f), highest = lowest;
+    for (int k = 0; k < s.count; ++k) {
+      const Vec center = PlaneValue(s, k, x, y, z);
+      const Vec half = hn::MulAdd(hn::Abs(hn::Set(d, s.mx[k])), hx,
+                                  hn::MulAdd(hn::Abs(hn::Set(d, s.my[k])), hy, hn::Mul(hn::Abs(hn::Set(d, s.mz[k])), hz)));
+      lowest = hn::Min(lowest, hn::Sub(center, half));
+      highest = hn::Min(highest, hn::Add(center, half));
+    }
+    // Certain beyond +-1; the boxes' own arithmetic is within another unit of the error bound.
+    bits.possible |= Bits(hn::Ge(highest, hn::Set(d, -2.0f))) << i;
+    bits.inside |= Bits(hn::Gt(lowest, hn::Set(d, 2.0f))) << i;
+  }
+  bits.possible &= open;
+  return bits;
+}
+
+/// One group of samples against the planes: bits certainly inside, and bits that are not certainly outside.
+HWY_INLINE void TestGroup(const ScaledPlanes& s, const float* x, const float* y, const float* z, std::uint64_t& inside,
+                          std::uint64_t& possible) {
   const Tag d;
   inside = possible = 0;
-  for (std::size_t i = 0; i < 64; i += hn::Lanes(d)) {
+  for (std::size_t i = 0; i < KernelSamples::kGroup; i += hn::Lanes(d)) {
     const Vec px = hn::LoadU(d, x + i), py = hn::LoadU(d, y + i), pz = hn::LoadU(d, z + i);
     Vec least = hn::Min(PlaneValue(s, 0, px, py, pz), hn::Min(PlaneValue(s, 1, px, py, pz), PlaneValue(s, 2, px, py, pz)));
     if (s.count == 4) least = hn::Min(least, PlaneValue(s, 3, px, py, pz));
@@ -167,31 +196,49 @@ HWY_INLINE void TestWord(const ScaledPlanes& s, const float* x, const float* y, 
   }
 }
 
+/// Bits of the groups of mask words [word, word + count) that have samples left to block; count <= 16.
+HWY_INLINE std::uint64_t OpenGroups(const std::uint64_t* valid, const std::uint64_t* mask, std::size_t word, std::size_t count) {
+  std::uint64_t open = 0;
+  for (std::size_t w = 0; w < count; ++w) {
+    const std::uint64_t rest = valid[word + w] & ~mask[word + w];
+    for (unsigned k = 0; k < 4; ++k) open |= std::uint64_t{((rest >> (16 * k)) & 0xffff) != 0} << (4 * w + k);
+  }
+  return open;
+}
+
 /// Tests every still open sample of one receiver; true where bits were added.
 HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples, const ScaledPlanes& planes,
                             std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters) {
-  const std::uint32_t set = receivers.set[receiver];
-  const std::size_t offset = std::size_t{set} * samples.padded;
+  constexpr std::uint32_t kGroup = KernelSamples::kGroup;
+  const std::size_t set = receivers.set[receiver], offset = set * samples.padded, groups_at = set * samples.group_stride;
   const vec3 r(receivers.x[receiver], receivers.y[receiver], receivers.z[receiver]);
   std::uint64_t* mask = receivers.masks.data() + receiver * receivers.words;
-  std::uint64_t added = 0, missing = 0;
-  for (std::uint32_t w = 0; w < receivers.words; ++w) {
-    const std::uint64_t rest = samples.valid[w] & ~mask[w];
-    if (rest == 0) continue;
-    std::uint64_t inside, possible;
-    TestWord(planes, &samples.x[offset + 64 * w], &samples.y[offset + 64 * w], &samples.z[offset + 64 * w], inside, possible);
-    counters.sample_tests += 64;
-    inside &= rest;
-    const std::uint64_t doubtful = possible & ~inside & rest;
-    if (doubtful != 0 || blocker.perforated) {
-      inside = settle_word(blocker, r, samples.exact->set(set), 64 * w, inside, doubtful, counters);
+  bool added = false;
+  for (std::size_t word = 0; word < receivers.words; word += 16) {
+    const std::uint64_t open = OpenGroups(samples.valid.data(), mask, word, std::min<std::size_t>(16, receivers.words - word));
+    const GroupBits groups = TestGroups(planes, samples, groups_at + 4 * word, open);
+    for (std::uint64_t rest = groups.possible; rest != 0; rest &= rest - 1) {
+      const std::size_t g = 4 * word + static_cast<std::size_t>(std::countr_zero(rest)), first = g * kGroup;
+      const std::size_t w = first / 64, shift = first % 64;
+      const std::uint64_t wanted = ((samples.valid[w] & ~mask[w]) >> shift) & 0xffff;
+      std::uint64_t inside = wanted, possible = wanted;
+      if (((groups.inside >> (g - 4 * word)) & 1) == 0) {
+        const std::size_t at = offset + first;
+        TestGroup(planes, &samples.x[at], &samples.y[at], &samples.z[at], inside, possible);
+        counters.sample_tests += kGroup;
+        inside &= wanted;
+        possible &= wanted;
+      }
+      const std::uint64_t doubtful = possible & ~inside;
+      if (doubtful != 0 || blocker.perforated) {
+        inside = settle_samples(blocker, r, {samples.points.data() + offset + first, kGroup}, inside, doubtful, counters);
+      }
+      mask[w] |= inside << shift;
+      added = added || inside != 0;
     }
-    mask[w] |= inside;
-    added |= inside;
-    missing |= rest & ~inside;
   }
-  if (missing == 0) receivers.open[receiver] = 0;
-  return added != 0;
+  if (added && std::equal(samples.valid.begin(), samples.valid.end(), mask)) receivers.open[receiver] = 0;
+  return added;
 }
 
 /// A receiver that the first test could not rule out.

@@ -15,19 +15,32 @@ namespace halfshade {
 
 struct LightBound;
 
-/// Light samples as the kernel reads them: offsets from the light's centre, one padded run of floats per set.
+/// Light samples as the kernel reads them: offsets from the light's centre in an order that puts neighbours together,
+/// in groups of 16 with a bounding box each. Bit i of a mask under construction is the i-th sample of this order.
 struct KernelSamples {
+  static constexpr std::uint32_t kGroup = 16;
   std::uint32_t count = 0;
   std::uint32_t padded = 0;                         // count rounded up to a multiple of 64
+  std::uint32_t sets = 1;
   vec3 center{0.0f};                                // on the lattice
   float reach = 0.0f;                               // max |coordinate| of an offset
   std::array<vec3, 3> half_axes{};                  // parallelepiped around all offsets
-  std::vector<float> x, y, z;                       // [set][padded]; the padding repeats the first sample
+  std::vector<std::uint32_t> order;                 // [padded] -> sample index; the padding repeats the last sample
+  std::vector<float> x, y, z;                       // [set][padded] offsets
+  std::vector<vec3> points;                         // [set][padded] positions on the lattice
+  std::uint32_t group_stride = 0;                   // groups per set, rounded up to a multiple of 64
+  std::vector<float> group_x, group_y, group_z;     // [set][group_stride] centres of the groups' boxes
+  std::vector<float> half_x, half_y, half_z;        // [set][group_stride] half extents, rounded up
   std::vector<std::uint64_t> valid;                 // [padded / 64]: bits of real samples
-  const LightSamples* exact = nullptr;
+
+  std::span<const vec3> set_points(std::uint32_t set) const { return {points.data() + std::size_t{set} * padded, padded}; }
 };
 
 KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound);
+
+/// Mask bits from the kernel's order of samples to sample indices.
+void restore_sample_order(const KernelSamples& samples, std::span<const std::uint64_t> kernel_mask,
+                          std::span<std::uint64_t> mask);
 
 /// Receivers in the order of the lists, as parallel arrays with kLanePadding entries to spare at the end.
 struct KernelReceivers {

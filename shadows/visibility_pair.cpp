@@ -12,26 +12,88 @@ namespace {
 float norm1(const vec3& v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); }
 float norm_max(const vec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
 
+/// Sorts sample indices so that every run of 16 is compact: halves along the longest side, at multiples of 16.
+void group_neighbours(std::span<const vec3> points, std::span<std::uint32_t> order) {
+  if (order.size() <= KernelSamples::kGroup) return;
+  vec3 low = points[order[0]], high = low;
+  for (const std::uint32_t i : order) low = glm::min(low, points[i]), high = glm::max(high, points[i]);
+  const vec3 extent = high - low;
+  const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : (extent.y >= extent.z ? 1 : 2);
+  const std::size_t groups = (order.size() + KernelSamples::kGroup - 1) / KernelSamples::kGroup;
+  const std::size_t middle = groups / 2 * KernelSamples::kGroup;
+  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(middle), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) {
+                     const float x = points[a][axis], y = points[b][axis];
+                     return x != y ? x < y : a < b;
+                   });
+  group_neighbours(points, order.first(middle));
+  group_neighbours(points, order.subspan(middle));
+}
+
+/// Bounding boxes of the groups, in offsets from the light's centre; widened so that float rounding cannot shrink them.
+void add_groups(KernelSamples& kernel) {
+  const std::uint32_t groups = kernel.padded / KernelSamples::kGroup;
+  kernel.group_stride = (groups + 63) / 64 * 64;
+  for (auto* values : {&kernel.group_x, &kernel.group_y, &kernel.group_z, &kernel.half_x, &kernel.half_y, &kernel.half_z}) {
+    values->assign(std::size_t{kernel.sets} * kernel.group_stride, 0.0f);
+  }
+  for (std::size_t g = 0; g < std::size_t{kernel.sets} * groups; ++g) {
+    const std::size_t first = g * KernelSamples::kGroup, at = g / groups * kernel.group_stride + g % groups;
+    vec3 low(kernel.x[first], kernel.y[first], kernel.z[first]), high = low;
+    for (std::size_t i = first; i < first + KernelSamples::kGroup; ++i) {
+      const vec3 p(kernel.x[i], kernel.y[i], kernel.z[i]);
+      low = glm::min(low, p), high = glm::max(high, p);
+    }
+    const vec3 center = (low + high) * 0.5f, half = (high - low) * (0.5f + 0x1p-20f) + glm::abs(center) * 0x1p-20f;
+    kernel.group_x[at] = center.x, kernel.group_y[at] = center.y, kernel.group_z[at] = center.z;
+    kernel.half_x[at] = half.x, kernel.half_y[at] = half.y, kernel.half_z[at] = half.z;
+  }
+}
+
 }  // namespace
 
 KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound) {
   KernelSamples kernel;
   kernel.count = samples.count;
   kernel.padded = (samples.count + 63) / 64 * 64;
+  kernel.sets = samples.sets;
   kernel.center = bound.center;
-  kernel.exact = &samples;
+  for (std::uint32_t i = 0; i < samples.count; ++i) kernel.order.push_back(i);
+  group_neighbours(samples.set(0), kernel.order);
+  kernel.order.resize(kernel.padded, kernel.order.back());
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    const std::span<const vec3> points = samples.set(set);
-    for (std::uint32_t i = 0; i < kernel.padded; ++i) {
-      const vec3 offset = points[i < samples.count ? i : 0] - bound.center;
+    for (const std::uint32_t i : kernel.order) {
+      const vec3 point = samples.set(set)[i], offset = point - bound.center;
+      kernel.points.push_back(point);
       kernel.x.push_back(offset.x), kernel.y.push_back(offset.y), kernel.z.push_back(offset.z);
       kernel.reach = std::max(kernel.reach, norm_max(offset));
     }
   }
+  add_groups(kernel);
   for (int k = 0; k < 3; ++k) kernel.half_axes[k] = vec3(bound.half_axes[k] * (1.0 + 0x1p-20));
   kernel.valid.assign(kernel.padded / 64, ~std::uint64_t{0});
   if (samples.count % 64 != 0) kernel.valid.back() = (std::uint64_t{1} << (samples.count % 64)) - 1;
   return kernel;
+}
+
+void restore_sample_order(const KernelSamples& samples, std::span<const std::uint64_t> kernel_mask,
+                          std::span<std::uint64_t> mask) {
+  bool all = true, none = true;
+  for (std::size_t w = 0; w < mask.size(); ++w) {
+    all = all && kernel_mask[w] == samples.valid[w];
+    none = none && kernel_mask[w] == 0;
+  }
+  if (all || none) {
+    std::copy(kernel_mask.begin(), kernel_mask.end(), mask.begin());
+    return;
+  }
+  std::fill(mask.begin(), mask.end(), 0);
+  for (std::size_t w = 0; w < mask.size(); ++w) {
+    for (std::uint64_t rest = kernel_mask[w]; rest != 0; rest &= rest - 1) {
+      const std::uint32_t index = samples.order[64 * w + static_cast<std::size_t>(std::countr_zero(rest))];
+      mask[index / 64] |= std::uint64_t{1} << (index % 64);
+    }
+  }
 }
 
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle) {
@@ -58,19 +120,19 @@ Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std:
   return b;
 }
 
-std::uint64_t settle_word(const Blocker& blocker, const vec3& receiver, std::span<const vec3> samples,
-                          std::uint32_t first_sample, std::uint64_t inside, std::uint64_t doubtful,
-                          KernelCounters& counters) {
+std::uint64_t settle_samples(const Blocker& blocker, const vec3& receiver, std::span<const vec3> samples,
+                             std::uint64_t inside, std::uint64_t doubtful, KernelCounters& counters) {
   const auto& [a, b, c] = blocker.corner;
   counters.exact_fallbacks += static_cast<std::uint64_t>(std::popcount(doubtful));
   for (std::uint64_t rest = doubtful; rest != 0; rest &= rest - 1) {
     const int bit = std::countr_zero(rest);
-    if (blocks(a, b, c, receiver, samples[first_sample + bit])) inside |= std::uint64_t{1} << bit;
+    if (blocks(a, b, c, receiver, samples[static_cast<std::size_t>(bit)])) inside |= std::uint64_t{1} << bit;
   }
-  if (!blocker.perforated) return inside;
+  if (!blocker.perforated || inside == 0) return inside;
+  const AlphaLookup lookup(blocker.alpha, receiver);
   for (std::uint64_t rest = inside; rest != 0; rest &= rest - 1) {
     const int bit = std::countr_zero(rest);
-    if (!opaque_at_hit(blocker.alpha, receiver, samples[first_sample + bit])) inside &= ~(std::uint64_t{1} << bit);
+    if (!lookup.opaque(samples[static_cast<std::size_t>(bit)], counters.exact_fallbacks)) inside &= ~(std::uint64_t{1} << bit);
   }
   return inside;
 }

@@ -29,10 +29,9 @@ struct Blocker {
 
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle);
 
-/// Settles one word of a receiver's mask: `inside` are samples that the blocker's outline certainly covers, `doubtful`
-/// those the float filter left open. Returns the bits to set.
-std::uint64_t settle_word(const Blocker& blocker, const vec3& receiver, std::span<const vec3> samples,
-                          std::uint32_t first_sample, std::uint64_t inside, std::uint64_t doubtful,
-                          KernelCounters& counters);
+/// Settles up to 64 samples of one receiver: `inside` are bits of samples that the blocker's outline certainly covers,
+/// `doubtful` those the float filter left open. Returns the bits of the samples that are blocked.
+std::uint64_t settle_samples(const Blocker& blocker, const vec3& receiver, std::span<const vec3> samples,
+                             std::uint64_t inside, std::uint64_t doubtful, KernelCounters& counters);
 
 }  // namespace halfshade

@@ -9,7 +9,7 @@ bool test_pair(const LatticeMesh& mesh, const KernelSamples& samples, std::uint3
                KernelReceivers& receivers) {
   const auto [a, b, c] = mesh.corners(triangle);
   const vec3 r(receivers.x[i], receivers.y[i], receivers.z[i]);
-  const std::span<const vec3> set = samples.exact->set(receivers.set[i]);
+  const std::span<const vec3> set = samples.set_points(receivers.set[i]).first(samples.count);
   std::uint64_t* mask = receivers.masks.data() + i * receivers.words;
   bool added = false;
   for (std::size_t s = 0; s < set.size(); ++s) {

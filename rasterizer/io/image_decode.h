@@ -1,8 +1,8 @@
 // Pictures from outside, decoded in memory by exactly one reader of OpenImageIO.
 //
-// Known faults of OpenImageIO 2.4.7 that this guards against: it tries every reader on an unknown file, believes any
-// size in a header, and returns half-filled pictures for truncated files (CVE-2023-24472 and others came in through the
-// readers that are not on the list here).
+// What this guards against in OpenImageIO 2.4.7: it tries every reader on an unknown file (several of its faults known
+// since are in readers that are not on the list here), believes any size in a header, and returns half-filled pictures
+// for truncated files.
 #pragma once
 
 #include <cstddef>

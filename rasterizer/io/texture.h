@@ -20,8 +20,8 @@ class TextureSet {
   /// be decoded completely, Error{kLimit} when one decoded picture, or all maps together, would exceed `max_bytes`.
   void load(Scene& scene, std::uint64_t max_bytes);
 
-  /// After load(): index into Scene::color_maps, Scene::alpha_maps. kNone for an alpha map without any effect is never
-  /// returned: a picture without alpha channel gives its luminance.
+  /// After load(): index into Scene::color_maps, Scene::alpha_maps. The alpha map of a picture without an alpha channel
+  /// is its luminance.
   std::uint32_t color_map(std::uint32_t request) const { return files_[request].color_map; }
   std::uint32_t alpha_map(std::uint32_t request) const { return files_[request].alpha_map; }
 

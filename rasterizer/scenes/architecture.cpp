@@ -108,7 +108,7 @@ void make_columns(std::uint32_t size, BuiltinScene& out) {
 
 void make_bars(std::uint32_t size, BuiltinScene& out) {
   MeshBuilder builder(out.scene);
-  builder.material("floor", {0.76f, 0.73f, 0.68f});
+  builder.material("floor", {0.60f, 0.57f, 0.53f});
   builder.ground(6.0);
   const std::uint32_t steel = builder.material("steel", {0.30f, 0.36f, 0.44f});
   const std::uint32_t brass = builder.material("brass", {0.62f, 0.44f, 0.16f});

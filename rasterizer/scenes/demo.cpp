@@ -171,7 +171,7 @@ void make_knot_on_plinth(MeshBuilder& builder, const dvec3& foot, std::uint32_t 
 
 void make_demo(std::uint32_t size, BuiltinScene& out) {
   MeshBuilder builder(out.scene);
-  builder.material("cove", {0.78f, 0.74f, 0.68f});
+  builder.material("cove", {0.62f, 0.58f, 0.53f});
   make_cove(builder, size / 2);
   make_knot_on_plinth(builder, {0.0, 0.0, -0.2}, size);
   builder.material("limestone", {0.78f, 0.72f, 0.62f});

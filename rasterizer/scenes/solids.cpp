@@ -26,7 +26,7 @@ void make_animal(MeshBuilder& builder, const Placement& at, std::uint32_t wool, 
 
 void make_torus_knot(std::uint32_t size, BuiltinScene& out) {
   MeshBuilder builder(out.scene);
-  builder.material("floor", {0.74f, 0.71f, 0.66f});
+  builder.material("floor", {0.60f, 0.57f, 0.53f});
   builder.ground(6.0);
   builder.material("knot", {0.10f, 0.36f, 0.44f});
   // The tube is about ten times as long as it is round: 2 * sides * rings triangles with rings = 10 sides.
@@ -44,7 +44,7 @@ void make_torus_knot(std::uint32_t size, BuiltinScene& out) {
 
 void make_sphere(std::uint32_t size, BuiltinScene& out) {
   MeshBuilder builder(out.scene);
-  builder.material("floor", {0.74f, 0.71f, 0.66f});
+  builder.material("floor", {0.60f, 0.57f, 0.53f});
   builder.ground(5.0);
   builder.material("ball", {0.72f, 0.27f, 0.16f});
   const std::uint32_t first_triangle = builder.triangle_count();

@@ -130,7 +130,7 @@ void make_hairball(std::uint32_t size, BuiltinScene& out) {
   Scene& scene = out.scene;
   MeshBuilder builder(scene);
   const dvec3 center{0.0, 1.4, 0.0};
-  builder.material("floor", {0.74f, 0.71f, 0.66f});
+  builder.material("floor", {0.60f, 0.57f, 0.53f});
   builder.ground(6.0);
   builder.material("core", {0.30f, 0.16f, 0.10f});
   builder.ellipsoid(center, {1.0, 1.0, 1.0}, 32, 16);
