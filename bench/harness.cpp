@@ -15,7 +15,8 @@ namespace {
 /// "1c8749e" or "1c8749e-dirty"; "unknown" outside a git checkout.
 std::string source_version() {
   std::string text;
-  if (std::FILE* pipe = popen("git -C '" HALFSHADE_SOURCE_DIR "' describe --always --dirty --abbrev=12 2>/dev/null", "r")) {
+  if (std::FILE* pipe =
+          popen("git -C '" HALFSHADE_SOURCE_DIR "' describe --always --dirty --abbrev=12 2>/dev/null", "r")) {
     std::array<char, 128> line{};
     if (std::fgets(line.data(), line.size(), pipe) != nullptr) text = line.data();
     pclose(pipe);
@@ -50,7 +51,8 @@ std::vector<Timing> measure_interleaved(const std::vector<std::function<void()>>
 
 std::uint64_t count_differences(const VisibilityMasks& a, const VisibilityMasks& b) {
   std::uint64_t count = 0;
-  for (std::size_t i = 0; i < a.words.size(); ++i) count += static_cast<std::uint64_t>(std::popcount(a.words[i] ^ b.words[i]));
+  for (std::size_t i = 0; i < a.words.size(); ++i)
+    count += static_cast<std::uint64_t>(std::popcount(a.words[i] ^ b.words[i]));
   return count;
 }
 
@@ -69,7 +71,8 @@ nlohmann::ordered_json run_conditions(int threads) {
 }
 
 nlohmann::ordered_json timing_json(const Timing& timing) {
-  return {{"median_ms", timing.median()}, {"min_ms", timing.min()}, {"max_ms", timing.max()}, {"samples_ms", timing.ms}};
+  return {
+      {"median_ms", timing.median()}, {"min_ms", timing.min()}, {"max_ms", timing.max()}, {"samples_ms", timing.ms}};
 }
 
 }  // namespace halfshade::bench

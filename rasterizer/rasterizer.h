@@ -8,16 +8,17 @@
 namespace halfshade {
 
 struct RasterConfig {
-  std::uint32_t width = 512, height = 512;  // whole picture in samples (pixels times subsamples per axis); 1..16384 each
-  PixelWindow window;                       // part to render, in samples; all zero = whole picture
+  std::uint32_t width = 512,
+                height = 512;  // whole picture in samples (pixels times subsamples per axis); 1..16384 each
+  PixelWindow window;          // part to render, in samples; all zero = whole picture
 };
 
 struct RasterStats {
   std::uint64_t triangles_in = 0;
-  std::uint64_t triangles_clipped = 0;   // crossed the near plane or the guard band
-  std::uint64_t triangles_binned = 0;    // survived set-up
-  std::uint64_t tile_entries = 0;        // (tile, triangle) pairs
-  std::uint64_t samples_covered = 0;     // coverage bits before the depth test
+  std::uint64_t triangles_clipped = 0;  // crossed the near plane or the guard band
+  std::uint64_t triangles_binned = 0;   // survived set-up
+  std::uint64_t tile_entries = 0;       // (tile, triangle) pairs
+  std::uint64_t samples_covered = 0;    // coverage bits before the depth test
 };
 
 /// Draws `mesh` as seen from `camera` (world space) into `gbuffer`. Runs in the calling thread's TBB arena.

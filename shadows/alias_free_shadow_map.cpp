@@ -27,7 +27,7 @@ struct ViewLists {
   LightView view;
   IrregularZBuffer zbuffer;
   std::uint32_t near_cell = 0;
-  std::vector<RowBlock> blocks;              // the last one holds the receivers that are too near to project
+  std::vector<RowBlock> blocks;  // the last one holds the receivers that are too near to project
   std::vector<std::uint32_t> block_of_row;
 };
 
@@ -175,7 +175,8 @@ void solve_view(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
     report_progress(config, turn.share(static_cast<double>(first) / static_cast<double>(part_count)));
     parallel_tasks(active, [&](std::size_t p) {
       const std::size_t begin = (first + p) * kTrianglesPerPart;
-      find_spans(mesh, view_positions, lists, begin, std::min(mesh.triangles.size(), begin + kTrianglesPerPart), parts[p]);
+      find_spans(mesh, view_positions, lists, begin, std::min(mesh.triangles.size(), begin + kTrianglesPerPart),
+                 parts[p]);
     });
     stats.cull_ms += watch.lap();
     parallel_tasks(lists.blocks.size(), [&](std::size_t b) {
@@ -206,7 +207,8 @@ void solve_alias_free_shadow_map(const LatticeMesh& mesh, const ReceiverArray& r
                                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
                                  ShadowStats& stats) {
   if (config.grid_resolution != 0 && (config.grid_resolution < 16 || config.grid_resolution > 2048)) {
-    throw Error(ErrorCode::kUsage, "grid resolution: " + std::to_string(config.grid_resolution) + " is not in 16..2048");
+    throw Error(ErrorCode::kUsage,
+                "grid resolution: " + std::to_string(config.grid_resolution) + " is not in 16..2048");
   }
   Stopwatch watch;
   masks.reset(receivers.size(), samples.count);

@@ -99,7 +99,8 @@ class TexelFinder {
     }
     const double scale = size / kUvUnitsPerOne, total = std::fabs(sum_);
     const double texel = numerator / sum_ * scale;
-    // |w_i| errors move numerator and sum by 3 error each; the remaining roundings are below 16 units of the last place.
+    // |w_i| errors move numerator and sum by 3 error each; the remaining roundings are below 16 units of the last
+    // place.
     const double error = (7.0 * weights_.error / total + 16.0 * 0x1p-53) * magnitude * scale * 2.0;
     const double low = std::floor(texel - error), high = std::floor(texel + error);
     if (total > 16.0 * weights_.error && low == high) return static_cast<std::int64_t>(low);
@@ -147,7 +148,8 @@ std::array<std::uint32_t, 2> texel_at_hit(const AlphaTriangle& triangle, const v
   return {column, height - 1 - up};
 }
 
-AlphaLookup::AlphaLookup(const AlphaTriangle& triangle, const vec3& receiver) : triangle_(triangle), receiver_(receiver) {
+AlphaLookup::AlphaLookup(const AlphaTriangle& triangle, const vec3& receiver)
+    : triangle_(triangle), receiver_(receiver) {
   const auto norm1 = [](const dvec3& v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); };
   const dvec3 origin(receiver);
   double size = 0.0, reach = 0.0;

@@ -1,8 +1,8 @@
 // Opacity of an alpha-tested triangle where a shadow segment crosses it, decided exactly.
 //
 // The hit divides the triangle by the three edge determinants w_i = det(edge_i, l - r), integers on the lattice; the
-// texture coordinate is the rational number sum(w_i uv_i) / sum(w_i). The texel under it is floor(u W) mod W, decided in
-// double where the error bound allows, otherwise by comparing 256-bit integers, so that every method, thread and
+// texture coordinate is the rational number sum(w_i uv_i) / sum(w_i). The texel under it is floor(u W) mod W, decided
+// in double where the error bound allows, otherwise by comparing 256-bit integers, so that every method, thread and
 // instruction set reads the same texel (stability.md b and B7).
 #pragma once
 
@@ -33,7 +33,8 @@ std::array<std::uint32_t, 2> texel_at_hit(const AlphaTriangle& triangle, const v
                                           std::uint64_t* exact_fallbacks = nullptr);
 
 /// Same requirement; true where the texel under the hit is opaque.
-bool opaque_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l, std::uint64_t* exact_fallbacks = nullptr);
+bool opaque_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l,
+                   std::uint64_t* exact_fallbacks = nullptr);
 
 /// Lookups for one receiver and many samples: texture coordinates as ratios of three linear functions of the sample,
 /// in double with an error bound; what that leaves open goes to texel_at_hit. The same texels, faster.

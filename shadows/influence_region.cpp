@@ -48,7 +48,8 @@ bool near_part_matters(const LightView& view, const std::array<dvec3, 3>& corner
   const double share = std::min(1.0, (depth + reach) / (view.near_z - reach));  // of the way from light to receiver
   for (int k = 0; k < 2; ++k) {
     const double to_low = std::max((view.receiver_low[k] - light_high[k]) * share, view.slope_low[k] * (depth + reach));
-    const double to_high = std::min((view.receiver_high[k] - light_low[k]) * share, view.slope_high[k] * (depth + reach));
+    const double to_high =
+        std::min((view.receiver_high[k] - light_low[k]) * share, view.slope_high[k] * (depth + reach));
     const double pad = 1e-9 + kPad * (std::fabs(to_low) + std::fabs(to_high));
     if (high[k] < light_low[k] + std::min(0.0, to_low) - pad) return false;
     if (low[k] > light_high[k] + std::max(0.0, to_high) + pad) return false;
@@ -66,7 +67,8 @@ dvec2 far_image(const LightView& view, const dvec3& v, const dvec3& l) {
 void add_sphere_images(const LightView& view, const dvec3& v, std::vector<dvec2>& points) {
   const double radius = view.sphere_radius, distance = glm::length(v);
   const dvec3 w = v / distance;
-  const dvec3 a = glm::normalize(std::fabs(w.x) < 0.6 ? dvec3(0, w.z, -w.y) : dvec3(-w.z, 0, w.x)), b = glm::cross(w, a);
+  const dvec3 a = glm::normalize(std::fabs(w.x) < 0.6 ? dvec3(0, w.z, -w.y) : dvec3(-w.z, 0, w.x)),
+              b = glm::cross(w, a);
   const double ring = radius * std::sqrt(std::max(0.0, 1.0 - radius * radius / (distance * distance)));
   const double reach = ring * 1.1547005383792517;  // circumscribed: 1 / cos 30 degrees
   const dvec3 middle = w * (radius * radius / distance);

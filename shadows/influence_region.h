@@ -1,10 +1,10 @@
-// Influence region of a blocker: the part of the light view outside of which it cannot hide any sample from any receiver
-// (Sintorn, Eisemann, Assarsson 2008, section 4.1).
+// Influence region of a blocker: the part of the light view outside of which it cannot hide any sample from any
+// receiver (Sintorn, Eisemann, Assarsson 2008, section 4.1).
 //
-// A receiver r that a point v of the blocker hides from a sample l lies on the ray from l through v, beyond v. Seen from
-// the light's centre it moves on a straight line from the image of v to the image of the ray's end on the far plane (the
-// plane of the farthest receiver). For a fixed l that end is a projective map of v, so the convex hull of the images of
-// the blocker's corners and of the light's bound projected through them holds every such r.
+// A receiver r that a point v of the blocker hides from a sample l lies on the ray from l through v, beyond v. Seen
+// from the light's centre it moves on a straight line from the image of v to the image of the ray's end on the far
+// plane (the plane of the farthest receiver). For a fixed l that end is a projective map of v, so the convex hull of
+// the images of the blocker's corners and of the light's bound projected through them holds every such r.
 //
 // Corners at or behind the light's plane have no such image. The blocker is clipped at a small depth in front of the
 // light; the rest of it can matter only inside a box around the light, and if it meets that box the region is the whole

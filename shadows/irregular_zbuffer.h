@@ -1,5 +1,5 @@
-// Irregular z-buffer: receivers sorted into the cells of a light view (Johnson et al. 2005; Aila and Laine 2004), stored
-// as in Sintorn, Eisemann, Assarsson 2008, section 3.1: a length and an offset per cell into one array.
+// Irregular z-buffer: receivers sorted into the cells of a light view (Johnson et al. 2005; Aila and Laine 2004),
+// stored as in Sintorn, Eisemann, Assarsson 2008, section 3.1: a length and an offset per cell into one array.
 #pragma once
 
 #include "halfshade/types.h"

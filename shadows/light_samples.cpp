@@ -10,8 +10,9 @@
 namespace halfshade {
 namespace {
 
-/// Rows of the cell grid: the exact grid with rows <= columns <= 2 rows where the count has one, else floor(sqrt(count))
-/// rows whose numbers of columns differ by at most one; each sample stands for the same area either way.
+/// Rows of the cell grid: the exact grid with rows <= columns <= 2 rows where the count has one, else
+/// floor(sqrt(count)) rows whose numbers of columns differ by at most one; each sample stands for the same area either
+/// way.
 std::uint32_t row_count(std::uint32_t count) {
   auto root = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(count)));
   while (root * root > count) --root;
@@ -65,13 +66,15 @@ bool finite(const dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) &&
 
 void check(const Light& light, const ShadowConfig& config) {
   if (config.light_sample_count < 1 || config.light_sample_count > 4096) {
-    throw Error(ErrorCode::kUsage, "light samples: " + std::to_string(config.light_sample_count) + " is not in 1..4096");
+    throw Error(ErrorCode::kUsage,
+                "light samples: " + std::to_string(config.light_sample_count) + " is not in 1..4096");
   }
   if (config.sample_sets < 1 || config.sample_sets > 256) {
     throw Error(ErrorCode::kUsage, "sample sets: " + std::to_string(config.sample_sets) + " is not in 1..256");
   }
-  require(finite(light.center) && finite(light.u) && finite(light.v) && finite(light.normal) && std::isfinite(light.radius),
-          light, "a coordinate is not finite");
+  require(
+      finite(light.center) && finite(light.u) && finite(light.v) && finite(light.normal) && std::isfinite(light.radius),
+      light, "a coordinate is not finite");
   require(light.radius >= 0.0, light, "the radius is negative");
   if (light.shape == LightShape::kSamples) {
     require(!light.points.empty(), light, "there are no sample points");
@@ -110,13 +113,16 @@ void describe(const Light& light, const LocalFrame& frame, LightSamples& samples
 
 dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2& st) {
   switch (light.shape) {
-    case LightShape::kRectangle: return light.u * (st.x - 0.5) + light.v * (st.y - 0.5);
+    case LightShape::kRectangle:
+      return light.u * (st.x - 0.5) + light.v * (st.y - 0.5);
     case LightShape::kDisk: {
       const dvec2 p = light.radius * concentric_disk(st);
       return samples.axis_u * p.x + samples.axis_v * p.y;
     }
-    case LightShape::kSphere: return light.radius * sphere_point(st);
-    default: return dvec3(0.0);
+    case LightShape::kSphere:
+      return light.radius * sphere_point(st);
+    default:
+      return dvec3(0.0);
   }
 }
 
@@ -165,13 +171,16 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
 
 std::vector<dvec3> light_extent(const Light& light) {
   switch (light.shape) {
-    case LightShape::kPoint: return {light.center};
+    case LightShape::kPoint:
+      return {light.center};
     case LightShape::kRectangle: {
       const dvec3 a = (light.u + light.v) * 0.5, b = (light.u - light.v) * 0.5;
       return {light.center + a, light.center - a, light.center + b, light.center - b};
     }
-    case LightShape::kSamples: return light.points;
-    default: return {light.center + dvec3(light.radius), light.center - dvec3(light.radius)};
+    case LightShape::kSamples:
+      return light.points;
+    default:
+      return {light.center + dvec3(light.radius), light.center - dvec3(light.radius)};
   }
 }
 

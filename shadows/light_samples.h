@@ -9,10 +9,10 @@ namespace halfshade {
 /// Samples of one light on the lattice of a local frame.
 struct LightSamples {
   std::uint32_t count = 0, sets = 1;
-  std::vector<vec3> points;   // [set][sample]
-  dvec3 center{0.0};          // local frame
-  bool flat = false;          // all samples lie (up to rounding) in one plane through `center`
-  bool one_sided = false;     // flat, and receivers at or behind the plane get no light
+  std::vector<vec3> points;  // [set][sample]
+  dvec3 center{0.0};         // local frame
+  bool flat = false;         // all samples lie (up to rounding) in one plane through `center`
+  bool one_sided = false;    // flat, and receivers at or behind the plane get no light
   dvec3 axis_u{1, 0, 0}, axis_v{0, 1, 0}, axis_n{0, 0, 1};  // orthonormal; flat lights: u, v in the plane, n = facing
 
   std::span<const vec3> set(std::uint32_t index) const { return {points.data() + std::size_t{index} * count, count}; }

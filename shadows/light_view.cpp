@@ -18,7 +18,7 @@ constexpr double kWiden = 1.0 + 1e-9;
 /// Convex polygon with edges along eight directions around points in the plane; four if `corners` is 4.
 std::vector<dvec2> polygon_around(const std::vector<dvec2>& points, int corners) {
   const double d = 0.7071067811865476;
-  const std::array<dvec2, 8> normals = {dvec2(1, 0), dvec2(d, d),   dvec2(0, 1),  dvec2(-d, d),
+  const std::array<dvec2, 8> normals = {dvec2(1, 0),  dvec2(d, d),   dvec2(0, 1),  dvec2(-d, d),
                                         dvec2(-1, 0), dvec2(-d, -d), dvec2(0, -1), dvec2(d, -d)};
   const int step = 8 / corners;
   std::vector<double> support;
@@ -154,7 +154,8 @@ LightBound make_light_bound(const Light& light, const LightSamples& samples) {
     const dvec3 q(glm::dot(d, axes[0]), glm::dot(d, axes[1]), glm::dot(d, axes[2]));
     reach = glm::max(reach, glm::abs(q));
     in_plane.emplace_back(q);
-    if (light.shape == LightShape::kSphere) bound.sphere_radius = std::max(bound.sphere_radius, glm::length(d) * kWiden);
+    if (light.shape == LightShape::kSphere)
+      bound.sphere_radius = std::max(bound.sphere_radius, glm::length(d) * kWiden);
   }
   for (int k = 0; k < 3; ++k) bound.half_axes[k] = axes[k] * (reach[k] * kWiden);
   if (bound.flat) bound.outline = polygon_around(in_plane, light.shape == LightShape::kRectangle ? 4 : 8);

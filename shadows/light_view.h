@@ -1,4 +1,5 @@
-// Views from the light: where receivers and blockers meet on a grid (Sintorn, Eisemann, Assarsson 2008, sections 3, 4.3).
+// Views from the light: where receivers and blockers meet on a grid (Sintorn, Eisemann, Assarsson 2008, sections
+// 3, 4.3).
 //
 // A flat light looks along its normal; a two-sided one has a second view backwards. A volumetric light looks along the
 // six faces of a cube. A view sees a point p at the slopes (x/z, y/z) from the light's centre. The grid is laid over
@@ -14,11 +15,11 @@ namespace halfshade {
 
 /// Convex bound of all samples of a light: a parallelepiped and, for spherical lights, a sphere.
 struct LightBound {
-  vec3 center{0.0f};                      // on the lattice
-  std::array<dvec3, 3> half_axes;         // orthogonal; the third is the (tiny) thickness of a flat light
+  vec3 center{0.0f};               // on the lattice
+  std::array<dvec3, 3> half_axes;  // orthogonal; the third is the (tiny) thickness of a flat light
   bool flat = false;
-  double sphere_radius = 0.0;             // > 0: all samples lie within this distance of the centre, use it as the bound
-  std::vector<dvec2> outline;             // flat lights: convex polygon around the samples, in units of axis_u, axis_v
+  double sphere_radius = 0.0;  // > 0: all samples lie within this distance of the centre, use it as the bound
+  std::vector<dvec2> outline;  // flat lights: convex polygon around the samples, in units of axis_u, axis_v
 };
 
 LightBound make_light_bound(const Light& light, const LightSamples& samples);
@@ -43,14 +44,14 @@ struct LightGrid {
 
 struct LightView {
   dvec3 origin{0.0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};  // local frame; orthonormal, looking along +z
-  std::vector<dvec3> light_points;  // vertices of the light's bound in view coordinates
-  double sphere_radius = 0.0;       // > 0: the bound is this sphere instead
-  bool flat = false;                // light_points lie in z = 0; the samples within light_depth of it
-  double light_depth = 0.0;         // max |z| of the light's bound
-  double near_z = 0.0, far_z = 0.0; // receivers on the grid have near_z <= z <= far_z
-  double clip_z = 0.0;              // blockers are projected beyond this depth only; light_depth < clip_z < near_z
-  bool has_receivers = false;       // on the grid; if not, the members below mean nothing
-  dvec2 slope_low{0.0}, slope_high{0.0};  // of the receivers on the grid
+  std::vector<dvec3> light_points;                        // vertices of the light's bound in view coordinates
+  double sphere_radius = 0.0;                             // > 0: the bound is this sphere instead
+  bool flat = false;                 // light_points lie in z = 0; the samples within light_depth of it
+  double light_depth = 0.0;          // max |z| of the light's bound
+  double near_z = 0.0, far_z = 0.0;  // receivers on the grid have near_z <= z <= far_z
+  double clip_z = 0.0;               // blockers are projected beyond this depth only; light_depth < clip_z < near_z
+  bool has_receivers = false;        // on the grid; if not, the members below mean nothing
+  dvec2 slope_low{0.0}, slope_high{0.0};        // of the receivers on the grid
   dvec3 receiver_low{0.0}, receiver_high{0.0};  // box of the receivers on the grid, view coordinates
   LightGrid grid;
 

@@ -14,10 +14,10 @@ struct Named {
   const char* name;
 };
 
-constexpr Named<ShadowMethod> kMethods[] = {{ShadowMethod::kAliasFreeShadowMap, "afsm"}, {ShadowMethod::kOracle, "oracle"}};
-constexpr Named<SamplePattern> kPatterns[] = {{SamplePattern::kRows, "rows"},
-                                              {SamplePattern::kUniform, "uniform"},
-                                              {SamplePattern::kStratified, "stratified"}};
+constexpr Named<ShadowMethod> kMethods[] = {{ShadowMethod::kAliasFreeShadowMap, "afsm"},
+                                            {ShadowMethod::kOracle, "oracle"}};
+constexpr Named<SamplePattern> kPatterns[] = {
+    {SamplePattern::kRows, "rows"}, {SamplePattern::kUniform, "uniform"}, {SamplePattern::kStratified, "stratified"}};
 
 template <class Value, std::size_t n>
 Value value_of(const Named<Value> (&table)[n], const std::string& name, const char* what) {

@@ -159,18 +159,22 @@ struct GroupBits {
   std::uint64_t possible = 0, inside = 0;
 };
 
-HWY_INLINE GroupBits TestGroups(const ScaledPlanes& s, const KernelSamples& samples, std::size_t first, std::uint64_t open) {
+HWY_INLINE GroupBits TestGroups(const ScaledPlanes& s, const KernelSamples& samples, std::size_t first,
+                                std::uint64_t open) {
   const Tag d;
   GroupBits bits;
   for (std::size_t i = 0; i < 64 && open >> i != 0; i += hn::Lanes(d)) {
     const std::size_t g = first + i;
-    const Vec x = hn::LoadU(d, &samples.group_x[g]), y = hn::LoadU(d, &samples.group_y[g]), z = hn::LoadU(d, &samples.group_z[g]);
-    const Vec hx = hn::LoadU(d, &samples.half_x[g]), hy = hn::LoadU(d, &samples.half_y[g]), hz = hn::LoadU(d, &samples.half_z[g]);
+    const Vec x = hn::LoadU(d, &samples.group_x[g]), y = hn::LoadU(d, &samples.group_y[g]),
+              z = hn::LoadU(d, &samples.group_z[g]);
+    const Vec hx = hn::LoadU(d, &samples.half_x[g]), hy = hn::LoadU(d, &samples.half_y[g]),
+              hz = hn::LoadU(d, &samples.half_z[g]);
     Vec lowest = hn::Set(d, 1e30f), highest = lowest;
     for (int k = 0; k < s.count; ++k) {
       const Vec center = PlaneValue(s, k, x, y, z);
-      const Vec half = hn::MulAdd(hn::Abs(hn::Set(d, s.mx[k])), hx,
-                                  hn::MulAdd(hn::Abs(hn::Set(d, s.my[k])), hy, hn::Mul(hn::Abs(hn::Set(d, s.mz[k])), hz)));
+      const Vec half =
+          hn::MulAdd(hn::Abs(hn::Set(d, s.mx[k])), hx,
+                     hn::MulAdd(hn::Abs(hn::Set(d, s.my[k])), hy, hn::Mul(hn::Abs(hn::Set(d, s.mz[k])), hz)));
       lowest = hn::Min(lowest, hn::Sub(center, half));
       highest = hn::Min(highest, hn::Add(center, half));
     }
@@ -189,7 +193,8 @@ HWY_INLINE void TestGroup(const ScaledPlanes& s, const float* x, const float* y,
   inside = possible = 0;
   for (std::size_t i = 0; i < KernelSamples::kGroup; i += hn::Lanes(d)) {
     const Vec px = hn::LoadU(d, x + i), py = hn::LoadU(d, y + i), pz = hn::LoadU(d, z + i);
-    Vec least = hn::Min(PlaneValue(s, 0, px, py, pz), hn::Min(PlaneValue(s, 1, px, py, pz), PlaneValue(s, 2, px, py, pz)));
+    Vec least =
+        hn::Min(PlaneValue(s, 0, px, py, pz), hn::Min(PlaneValue(s, 1, px, py, pz), PlaneValue(s, 2, px, py, pz)));
     if (s.count == 4) least = hn::Min(least, PlaneValue(s, 3, px, py, pz));
     inside |= Bits(hn::Gt(least, hn::Set(d, 1.0f))) << i;
     possible |= Bits(hn::Ge(least, hn::Set(d, -1.0f))) << i;
@@ -197,7 +202,8 @@ HWY_INLINE void TestGroup(const ScaledPlanes& s, const float* x, const float* y,
 }
 
 /// Bits of the groups of mask words [word, word + count) that have samples left to block; count <= 16.
-HWY_INLINE std::uint64_t OpenGroups(const std::uint64_t* valid, const std::uint64_t* mask, std::size_t word, std::size_t count) {
+HWY_INLINE std::uint64_t OpenGroups(const std::uint64_t* valid, const std::uint64_t* mask, std::size_t word,
+                                    std::size_t count) {
   std::uint64_t open = 0;
   for (std::size_t w = 0; w < count; ++w) {
     const std::uint64_t rest = valid[word + w] & ~mask[word + w];
@@ -210,12 +216,14 @@ HWY_INLINE std::uint64_t OpenGroups(const std::uint64_t* valid, const std::uint6
 HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples, const ScaledPlanes& planes,
                             std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters) {
   constexpr std::uint32_t kGroup = KernelSamples::kGroup;
-  const std::size_t set = receivers.set[receiver], offset = set * samples.padded, groups_at = set * samples.group_stride;
+  const std::size_t set = receivers.set[receiver], offset = set * samples.padded,
+                    groups_at = set * samples.group_stride;
   const vec3 r(receivers.x[receiver], receivers.y[receiver], receivers.z[receiver]);
   std::uint64_t* mask = receivers.masks.data() + receiver * receivers.words;
   bool added = false;
   for (std::size_t word = 0; word < receivers.words; word += 16) {
-    const std::uint64_t open = OpenGroups(samples.valid.data(), mask, word, std::min<std::size_t>(16, receivers.words - word));
+    const std::uint64_t open =
+        OpenGroups(samples.valid.data(), mask, word, std::min<std::size_t>(16, receivers.words - word));
     const GroupBits groups = TestGroups(planes, samples, groups_at + 4 * word, open);
     for (std::uint64_t rest = groups.possible; rest != 0; rest &= rest - 1) {
       const std::size_t g = 4 * word + static_cast<std::size_t>(std::countr_zero(rest)), first = g * kGroup;
@@ -231,7 +239,8 @@ HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples
       }
       const std::uint64_t doubtful = possible & ~inside;
       if (doubtful != 0 || blocker.perforated) {
-        inside = settle_samples(blocker, r, {samples.points.data() + offset + first, kGroup}, inside, doubtful, counters);
+        inside =
+            settle_samples(blocker, r, {samples.points.data() + offset + first, kGroup}, inside, doubtful, counters);
       }
       mask[w] |= inside << shift;
       added = added || inside != 0;

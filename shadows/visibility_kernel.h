@@ -20,20 +20,22 @@ struct LightBound;
 struct KernelSamples {
   static constexpr std::uint32_t kGroup = 16;
   std::uint32_t count = 0;
-  std::uint32_t padded = 0;                         // count rounded up to a multiple of 64
+  std::uint32_t padded = 0;  // count rounded up to a multiple of 64
   std::uint32_t sets = 1;
-  vec3 center{0.0f};                                // on the lattice
-  float reach = 0.0f;                               // max |coordinate| of an offset
-  std::array<vec3, 3> half_axes{};                  // parallelepiped around all offsets
-  std::vector<std::uint32_t> order;                 // [padded] -> sample index; the padding repeats the last sample
-  std::vector<float> x, y, z;                       // [set][padded] offsets
-  std::vector<vec3> points;                         // [set][padded] positions on the lattice
-  std::uint32_t group_stride = 0;                   // groups per set, rounded up to a multiple of 64
-  std::vector<float> group_x, group_y, group_z;     // [set][group_stride] centres of the groups' boxes
-  std::vector<float> half_x, half_y, half_z;        // [set][group_stride] half extents, rounded up
-  std::vector<std::uint64_t> valid;                 // [padded / 64]: bits of real samples
+  vec3 center{0.0f};                             // on the lattice
+  float reach = 0.0f;                            // max |coordinate| of an offset
+  std::array<vec3, 3> half_axes{};               // parallelepiped around all offsets
+  std::vector<std::uint32_t> order;              // [padded] -> sample index; the padding repeats the last sample
+  std::vector<float> x, y, z;                    // [set][padded] offsets
+  std::vector<vec3> points;                      // [set][padded] positions on the lattice
+  std::uint32_t group_stride = 0;                // groups per set, rounded up to a multiple of 64
+  std::vector<float> group_x, group_y, group_z;  // [set][group_stride] centres of the groups' boxes
+  std::vector<float> half_x, half_y, half_z;     // [set][group_stride] half extents, rounded up
+  std::vector<std::uint64_t> valid;              // [padded / 64]: bits of real samples
 
-  std::span<const vec3> set_points(std::uint32_t set) const { return {points.data() + std::size_t{set} * padded, padded}; }
+  std::span<const vec3> set_points(std::uint32_t set) const {
+    return {points.data() + std::size_t{set} * padded, padded};
+  }
 };
 
 KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound);
@@ -49,7 +51,7 @@ struct KernelReceivers {
   std::vector<std::uint32_t> own;   // own triangle
   std::vector<std::uint32_t> open;  // all ones while some sample is not blocked yet, then zero
   std::vector<std::uint8_t> set;
-  std::vector<std::uint64_t> masks; // [receiver][words]
+  std::vector<std::uint64_t> masks;  // [receiver][words]
   std::size_t words = 0;
   std::size_t count = 0;
 };

@@ -34,7 +34,8 @@ void group_neighbours(std::span<const vec3> points, std::span<std::uint32_t> ord
 void add_groups(KernelSamples& kernel) {
   const std::uint32_t groups = kernel.padded / KernelSamples::kGroup;
   kernel.group_stride = (groups + 63) / 64 * 64;
-  for (auto* values : {&kernel.group_x, &kernel.group_y, &kernel.group_z, &kernel.half_x, &kernel.half_y, &kernel.half_z}) {
+  for (auto* values :
+       {&kernel.group_x, &kernel.group_y, &kernel.group_z, &kernel.half_x, &kernel.half_y, &kernel.half_z}) {
     values->assign(std::size_t{kernel.sets} * kernel.group_stride, 0.0f);
   }
   for (std::size_t g = 0; g < std::size_t{kernel.sets} * groups; ++g) {
@@ -132,7 +133,8 @@ std::uint64_t settle_samples(const Blocker& blocker, const vec3& receiver, std::
   const AlphaLookup lookup(blocker.alpha, receiver);
   for (std::uint64_t rest = inside; rest != 0; rest &= rest - 1) {
     const int bit = std::countr_zero(rest);
-    if (!lookup.opaque(samples[static_cast<std::size_t>(bit)], counters.exact_fallbacks)) inside &= ~(std::uint64_t{1} << bit);
+    if (!lookup.opaque(samples[static_cast<std::size_t>(bit)], counters.exact_fallbacks))
+      inside &= ~(std::uint64_t{1} << bit);
   }
   return inside;
 }

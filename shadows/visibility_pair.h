@@ -1,5 +1,5 @@
-// What the visibility kernel prepares once per blocker, and how it settles what floats cannot decide. Scalar code shared
-// by all instruction sets.
+// What the visibility kernel prepares once per blocker, and how it settles what floats cannot decide. Scalar code
+// shared by all instruction sets.
 #pragma once
 
 #include "shadows/alpha.h"
@@ -15,15 +15,15 @@ inline constexpr float kDeterminantError = 16.0f * 0x1p-24f;
 /// A blocker seen by one light: edges, plane, and on which sides of the plane the samples lie.
 struct Blocker {
   std::uint32_t triangle = kNone;
-  std::array<vec3, 3> corner, edge;          // edge[k] = corner[k + 1] - corner[k]
-  vec3 normal{0.0f};                         // edge[0] x edge[1], not normalised
-  std::array<float, 3> edge_error{};         // kDeterminantError * |edge|_1
-  float side_error = 0.0f;                   // kDeterminantError * |edge[0]|_1 |edge[1]|_1
-  float plane_at_center = 0.0f;              // normal . (light centre - corner 0)
-  float plane_error = 0.0f;                  // error bound of normal . (sample - corner 0)
+  std::array<vec3, 3> corner, edge;                 // edge[k] = corner[k + 1] - corner[k]
+  vec3 normal{0.0f};                                // edge[0] x edge[1], not normalised
+  std::array<float, 3> edge_error{};                // kDeterminantError * |edge|_1
+  float side_error = 0.0f;                          // kDeterminantError * |edge[0]|_1 |edge[1]|_1
+  float plane_at_center = 0.0f;                     // normal . (light centre - corner 0)
+  float plane_error = 0.0f;                         // error bound of normal . (sample - corner 0)
   bool samples_above = true, samples_below = true;  // some sample may lie on that side (along the normal) of the plane
   bool all_above = false, all_below = false;        // all samples certainly do
-  bool perforated = false;                   // alpha-tested: `alpha` is set
+  bool perforated = false;                          // alpha-tested: `alpha` is set
   AlphaTriangle alpha;
 };
 

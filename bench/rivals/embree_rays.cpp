@@ -139,7 +139,8 @@ void EmbreeRays::State::add_geometry(RTCScene scene, const std::vector<std::uint
 }
 
 RTCScene EmbreeRays::State::build(bool robust, BuildQuality quality) {
-  static constexpr RTCBuildQuality kQualities[] = {RTC_BUILD_QUALITY_LOW, RTC_BUILD_QUALITY_MEDIUM, RTC_BUILD_QUALITY_HIGH};
+  static constexpr RTCBuildQuality kQualities[] = {RTC_BUILD_QUALITY_LOW, RTC_BUILD_QUALITY_MEDIUM,
+                                                   RTC_BUILD_QUALITY_HIGH};
   RTCScene scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
   rtcSetSceneBuildQuality(scene, kQualities[static_cast<int>(quality)]);
@@ -263,7 +264,8 @@ std::vector<EmbreeMode> embree_modes(std::uint32_t sample_count) {
   return modes;
 }
 
-EmbreeRays::EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples, int threads)
+EmbreeRays::EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
+                       int threads)
     : state_(new State{mesh, receivers, samples}) {
   State& s = *state_;
   s.device = rtcNewDevice(("threads=" + std::to_string(threads)).c_str());
@@ -274,7 +276,8 @@ EmbreeRays::EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, 
     }
     const Material& material = mesh.scene->materials[mesh.scene->triangle_materials[t]];
     TriangleTexture texture{&mesh.scene->alpha_maps[material.alpha_map], opaque_threshold(material.alpha_cutoff), {}};
-    for (int i = 0; i < 3; ++i) texture.texel[i] = mesh.scene->triangle_uvs[t][i] * vec2(texture.map->width, texture.map->height);
+    for (int i = 0; i < 3; ++i)
+      texture.texel[i] = mesh.scene->triangle_uvs[t][i] * vec2(texture.map->width, texture.map->height);
     s.textures.push_back(texture);
     s.perforated.push_back(t);
   }
@@ -316,9 +319,15 @@ void EmbreeRays::trace(const EmbreeMode& mode, std::span<const std::uint32_t> or
     if (mode.coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     const auto part = order.subspan(begin * kPiece, std::min(end * kPiece, order.size()) - begin * kPiece);
     switch (mode.width) {
-      case 4: s.trace_range<4>(mode, context, part, masks); break;
-      case 8: s.trace_range<8>(mode, context, part, masks); break;
-      case 16: s.trace_range<16>(mode, context, part, masks); break;
+      case 4:
+        s.trace_range<4>(mode, context, part, masks);
+        break;
+      case 8:
+        s.trace_range<8>(mode, context, part, masks);
+        break;
+      case 16:
+        s.trace_range<16>(mode, context, part, masks);
+        break;
       default:
         for (const std::uint32_t r : part) s.trace_singly(s.scenes[variant(mode)], context, r, masks);
     }

@@ -41,8 +41,8 @@ class EmbreeRays {
   /// Milliseconds to build the tree that `mode` needs; built on the first call. Embree uses `threads` threads.
   double build_ms(const EmbreeMode& mode);
 
-  /// Traces all samples of receivers `order[0]`, `order[1]` ... and sets their blocked bits; `masks` holds all receivers
-  /// and zeros. Runs in the calling thread's TBB arena. Requires build_ms(mode) before.
+  /// Traces all samples of receivers `order[0]`, `order[1]` ... and sets their blocked bits; `masks` holds all
+  /// receivers and zeros. Runs in the calling thread's TBB arena. Requires build_ms(mode) before.
   void trace(const EmbreeMode& mode, std::span<const std::uint32_t> order, VisibilityMasks& masks) const;
 
  private:

@@ -23,7 +23,8 @@ int compare_dumps(const CompareOptions& options) {
   read_dump(options.a, a);
   read_dump(options.b, b);
   if (a.receivers.position != b.receivers.position || a.samples.points != b.samples.points) {
-    throw Error(ErrorCode::kBadInput, "the dumps have different receivers or light samples: their bits cannot be compared");
+    throw Error(ErrorCode::kBadInput,
+                "the dumps have different receivers or light samples: their bits cannot be compared");
   }
   std::uint64_t wrong = 0, receivers = 0;
   double worst = 0.0, squares = 0.0;
@@ -37,14 +38,15 @@ int compare_dumps(const CompareOptions& options) {
     worst = std::max(worst, dv), squares += dv * dv;
   }
   const double count = std::max<double>(1.0, static_cast<double>(a.masks.receiver_count));
-  fmt::print("bits         {} of {} differ, in {} of {} receivers\n", wrong, a.masks.receiver_count * a.masks.sample_count,
-             receivers, a.masks.receiver_count);
+  fmt::print("bits         {} of {} differ, in {} of {} receivers\n", wrong,
+             a.masks.receiver_count * a.masks.sample_count, receivers, a.masks.receiver_count);
   fmt::print("visibility   max |dV| {:g}, RMSE {:g}\n", worst, std::sqrt(squares / count));
   return worst <= options.max_error && (options.max_error > 0.0 || wrong == 0) ? kOk : kDifferent;
 }
 
 /// Mean structural similarity of two planes over 8x8 windows, values 0..1 (Wang et al. 2004, uniform window).
-double structural_similarity(const std::vector<double>& a, const std::vector<double>& b, std::size_t width, std::size_t height) {
+double structural_similarity(const std::vector<double>& a, const std::vector<double>& b, std::size_t width,
+                             std::size_t height) {
   constexpr std::size_t kWindow = 8;
   constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
   double sum = 0.0;
@@ -76,19 +78,21 @@ std::vector<double> luminance(const FloatImage& image) {
 }
 
 /// Differences as a picture: grey where equal, brighter or darker where A is.
-void write_difference(const std::string& path, const std::vector<double>& a, const std::vector<double>& b, std::uint32_t width,
-                      std::uint32_t height) {
+void write_difference(const std::string& path, const std::vector<double>& a, const std::vector<double>& b,
+                      std::uint32_t width, std::uint32_t height) {
   std::vector<float> values;
-  for (std::size_t i = 0; i < a.size(); ++i) values.push_back(static_cast<float>(std::clamp(0.5 + 0.5 * (a[i] - b[i]), 0.0, 1.0)));
+  for (std::size_t i = 0; i < a.size(); ++i)
+    values.push_back(static_cast<float>(std::clamp(0.5 + 0.5 * (a[i] - b[i]), 0.0, 1.0)));
   write_png(path, width, height, 1, values, false, 8, {});
 }
 
 int compare_images(const CompareOptions& options) {
   const FloatImage a = read_image(options.a), b = read_image(options.b);
   if (a.width != b.width || a.height != b.height || a.channel_names != b.channel_names) {
-    throw Error(ErrorCode::kBadInput, fmt::format("the pictures differ in size or channels: {}x{} with {} and {}x{} with {}",
-                                                  a.width, a.height, fmt::join(a.channel_names, ","), b.width, b.height,
-                                                  fmt::join(b.channel_names, ",")));
+    throw Error(
+        ErrorCode::kBadInput,
+        fmt::format("the pictures differ in size or channels: {}x{} with {} and {}x{} with {}", a.width, a.height,
+                    fmt::join(a.channel_names, ","), b.width, b.height, fmt::join(b.channel_names, ",")));
   }
   double worst = 0.0, squares = 0.0;
   std::uint64_t different = 0;

@@ -74,12 +74,14 @@ NpyArray read_array(const fs::path& directory, const std::string& name, const st
   bool fits = array.shape.size() == shape.size();
   for (std::size_t k = 0; fits && k < shape.size(); ++k) fits = shape[k] == 0 || shape[k] == array.shape[k];
   if (fits) return array;
-  throw Error(ErrorCode::kBadInput, fmt::format("{}: the array's shape is ({}), expected ({}) (0 = any)",
-                                                (directory / name).string(), fmt::join(array.shape, ", "), fmt::join(shape, ", ")));
+  throw Error(ErrorCode::kBadInput,
+              fmt::format("{}: the array's shape is ({}), expected ({}) (0 = any)", (directory / name).string(),
+                          fmt::join(array.shape, ", "), fmt::join(shape, ", ")));
 }
 
 /// Lattice points; anything off the lattice is not a dump of ours.
-std::vector<vec3> read_points(const fs::path& directory, const std::string& name, const std::vector<std::size_t>& shape) {
+std::vector<vec3> read_points(const fs::path& directory, const std::string& name,
+                              const std::vector<std::size_t>& shape) {
   const NpyArray array = read_array(directory, name, shape);
   const std::span<const double> values = array.as<double>();
   std::vector<vec3> points(values.size() / 3);
@@ -123,8 +125,10 @@ void read_alpha(const fs::path& directory, Dump& dump) {
     const std::string name = fmt::format("alpha_{}.npy", k);
     const NpyArray texels = read_array(directory, name, {0, 0});
     const auto values = texels.as<std::uint8_t>();
-    dump.scene.alpha_maps.push_back({name, static_cast<std::uint32_t>(texels.shape[1]),
-                                     static_cast<std::uint32_t>(texels.shape[0]), {values.begin(), values.end()}});
+    dump.scene.alpha_maps.push_back({name,
+                                     static_cast<std::uint32_t>(texels.shape[1]),
+                                     static_cast<std::uint32_t>(texels.shape[0]),
+                                     {values.begin(), values.end()}});
     Material material;
     material.alpha_map = static_cast<std::uint32_t>(k);
     material.alpha_cutoff = cutoffs[k];
@@ -176,7 +180,8 @@ void write_dump(const fs::path& directory, const LatticeMesh& mesh, const Receiv
                     {"box_min", {frame.box_min.x, frame.box_min.y, frame.box_min.z}},
                     {"half_extent", {frame.half_extent.x, frame.half_extent.y, frame.half_extent.z}},
                     {"scale", frame.scale}};
-  about["counts"] = {{"receivers", count}, {"triangles", mesh.triangles.size()}, {"samples", samples.count}, {"sets", samples.sets}};
+  about["counts"] = {
+      {"receivers", count}, {"triangles", mesh.triangles.size()}, {"samples", samples.count}, {"sets", samples.sets}};
   about["mask_hash"] = masks.hash();
   write_file_atomically(directory / "dump.json", about.dump(2) + "\n");
 }
@@ -203,7 +208,8 @@ void read_dump(const fs::path& directory, Dump& dump) {
   dump.samples.count = static_cast<std::uint32_t>(samples.shape[1]);
   for (const std::uint8_t set : dump.receivers.set) {
     if (set >= dump.samples.sets) {
-      throw Error(ErrorCode::kBadInput, fmt::format("receiver_sets.npy: set {} is not in 0..{}", set, dump.samples.sets - 1));
+      throw Error(ErrorCode::kBadInput,
+                  fmt::format("receiver_sets.npy: set {} is not in 0..{}", set, dump.samples.sets - 1));
     }
   }
   read_masks(directory, dump.samples.count, dump);

@@ -57,8 +57,8 @@ void print_triangles(const Scene& scene) {
 
 void print_light(const Light& light) {
   static constexpr const char* kNames[] = {"point", "rectangle", "disk", "sphere", "samples"};
-  fmt::print("light        {}: {} at ({:g}, {:g}, {:g}){}\n", light.name, kNames[static_cast<int>(light.shape)], light.center.x,
-             light.center.y, light.center.z, light.two_sided ? ", two-sided" : "");
+  fmt::print("light        {}: {} at ({:g}, {:g}, {:g}){}\n", light.name, kNames[static_cast<int>(light.shape)],
+             light.center.x, light.center.y, light.center.z, light.two_sided ? ", two-sided" : "");
 }
 
 void print_scene(const std::string& name, const ObjLoadOptions& options) {
@@ -71,8 +71,8 @@ void print_scene(const std::string& name, const ObjLoadOptions& options) {
   print_triangles(scene);
   fmt::print("vertices     {}\n", scene.positions.size());
   fmt::print("bounding box ({:g}, {:g}, {:g}) .. ({:g}, {:g}, {:g})\n", low.x, low.y, low.z, high.x, high.y, high.z);
-  fmt::print("edges        {}: {} open, {} shared by more than two triangles, {} by two of opposite winding\n", edges.edges,
-             edges.open, edges.crowded, edges.same_direction);
+  fmt::print("edges        {}: {} open, {} shared by more than two triangles, {} by two of opposite winding\n",
+             edges.edges, edges.open, edges.crowded, edges.same_direction);
   fmt::print("materials    {}, {} colour maps, {} alpha maps\n", scene.materials.size(), scene.color_maps.size(),
              scene.alpha_maps.size());
   const Camera& camera = source.view.camera;

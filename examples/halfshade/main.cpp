@@ -1,4 +1,5 @@
-// halfshade: exact soft shadows from area lights on the CPU. Results on standard output, everything else on standard error.
+// halfshade: exact soft shadows from area lights on the CPU. Results on standard output, everything else on standard
+// error.
 #include <fmt/format.h>
 
 #include <new>
@@ -11,11 +12,16 @@ namespace {
 
 int exit_code_of(halfshade::ErrorCode code) {
   switch (code) {
-    case halfshade::ErrorCode::kUsage: return halfshade::kUsage;
-    case halfshade::ErrorCode::kBadInput: return halfshade::kBadInput;
-    case halfshade::ErrorCode::kLimit: return halfshade::kLimit;
-    case halfshade::ErrorCode::kOutput: return halfshade::kOutput;
-    case halfshade::ErrorCode::kCancelled: return 128 + halfshade::stop_signal();
+    case halfshade::ErrorCode::kUsage:
+      return halfshade::kUsage;
+    case halfshade::ErrorCode::kBadInput:
+      return halfshade::kBadInput;
+    case halfshade::ErrorCode::kLimit:
+      return halfshade::kLimit;
+    case halfshade::ErrorCode::kOutput:
+      return halfshade::kOutput;
+    case halfshade::ErrorCode::kCancelled:
+      return 128 + halfshade::stop_signal();
   }
   return halfshade::kBadInput;
 }
@@ -30,7 +36,8 @@ int run(int argc, char** argv) {
   CLI::App app("Exact soft shadows from area lights: one bit for every receiver and light sample.", "halfshade");
   app.set_version_flag("--version", HALFSHADE_VERSION);
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 ok, 1 comparison failed, 2 usage, 3 bad input, 4 limit or memory, 5 output, 130/143 stopped.");
+  app.footer(
+      "Exit codes: 0 ok, 1 comparison failed, 2 usage, 3 bad input, 4 limit or memory, 5 output, 130/143 stopped.");
   int exit_code = halfshade::kOk;
   halfshade::add_render(app, joined(argc, argv), exit_code);
   halfshade::add_info(app);

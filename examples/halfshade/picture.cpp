@@ -46,7 +46,8 @@ class ExrLayers {
     planes_.push_back(std::move(values));
     channels_.push_back({name, type, nullptr});
   }
-  void add_vector(const std::string& name, const char* axes, ImageChannel::Type type, const std::vector<float>& values) {
+  void add_vector(const std::string& name, const char* axes, ImageChannel::Type type,
+                  const std::vector<float>& values) {
     for (std::size_t k = 0; k < 3; ++k) add(name + axes[k], type, plane(values, 3, k));
   }
   std::vector<ImageChannel> channels() {
@@ -93,7 +94,8 @@ Picture resolve(const GBuffer& gbuffer, std::uint32_t subsamples, const LocalFra
       for (std::size_t l = 0; l < visibility.size(); ++l) {
         picture.visibility[l].push_back(sums.surfaces > 0.0f ? sums.visibility[l] / sums.surfaces : 0.0f);
       }
-      const std::size_t middle = std::size_t{y * subsamples + subsamples / 2} * gbuffer.window.width() + x * subsamples + subsamples / 2;
+      const std::size_t middle =
+          std::size_t{y * subsamples + subsamples / 2} * gbuffer.window.width() + x * subsamples + subsamples / 2;
       const bool hit = gbuffer.triangle[middle] != kNone;
       push(picture.normal, gbuffer.shading_normal[middle]);
       push(picture.position_world, hit ? vec3(frame.to_world(gbuffer.position[middle])) : vec3(0.0f));

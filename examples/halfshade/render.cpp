@@ -71,9 +71,11 @@ void parse_size(const RenderOptions& options, Render& render) {
     usage_error(fmt::format("--size '{}' is not WIDTHxHEIGHT", options.size));
   }
   const auto k = static_cast<std::uint32_t>(std::lround(std::sqrt(options.spp)));
-  if (k * k != options.spp || k < 1 || k > 8) usage_error(fmt::format("--spp {} is not 1, 4, 9, 16, ... 64", options.spp));
+  if (k * k != options.spp || k < 1 || k > 8)
+    usage_error(fmt::format("--spp {} is not 1, 4, 9, 16, ... 64", options.spp));
   if (width < 1 || height < 1 || width * k > 16384 || height * k > 16384) {
-    usage_error(fmt::format("--size {} with --spp {}: each side times {} must be in 1..16384", options.size, options.spp, k));
+    usage_error(
+        fmt::format("--size {} with --spp {}: each side times {} must be in 1..16384", options.size, options.spp, k));
   }
   render.subsamples = k;
   render.raster.width = width * k;
@@ -82,7 +84,8 @@ void parse_size(const RenderOptions& options, Render& render) {
   if (!options.crop.empty()) {
     if (std::sscanf(options.crop.c_str(), "%5u,%5u,%5u,%5u%n", &crop.x0, &crop.x1, &crop.y0, &crop.y1, &used) != 4 ||
         options.crop[used] != '\0' || crop.x0 >= crop.x1 || crop.y0 >= crop.y1 || crop.x1 > width || crop.y1 > height) {
-      usage_error(fmt::format("--crop '{}' is not x0,x1,y0,y1 with x0 < x1 <= {} and y0 < y1 <= {}", options.crop, width, height));
+      usage_error(fmt::format("--crop '{}' is not x0,x1,y0,y1 with x0 < x1 <= {} and y0 < y1 <= {}", options.crop,
+                              width, height));
     }
   }
   render.raster.window = {crop.x0 * k, crop.x1 * k, crop.y0 * k, crop.y1 * k};
@@ -149,7 +152,8 @@ void verify(const Render& render, LightResult& result) {
       std::fill(truth.begin(), truth.end(), 0);
       oracle_mask(render.mesh, result.receivers, chosen[k], result.samples, truth);
       const auto mask = result.masks.mask(chosen[k]);
-      for (std::size_t w = 0; w < truth.size(); ++w) wrong[k] += static_cast<std::uint64_t>(std::popcount(truth[w] ^ mask[w]));
+      for (std::size_t w = 0; w < truth.size(); ++w)
+        wrong[k] += static_cast<std::uint64_t>(std::popcount(truth[w] ^ mask[w]));
     }
   });
   result.verified = chosen.size();
@@ -179,9 +183,12 @@ ImageAttributes attributes(const Render& render) {
   const RenderOptions& o = render.options;
   std::string hashes;
   for (const LightResult& light : render.lights) hashes += (hashes.empty() ? "" : ",") + light.masks.hash();
-  return {{"halfshade.version", HALFSHADE_VERSION}, {"halfshade.command", o.command_line},
-          {"halfshade.method", o.method},           {"halfshade.light_samples", std::to_string(o.light_samples)},
-          {"halfshade.seed", std::to_string(o.seed)}, {"halfshade.scene_hash", scene_hash(render.source.scene)},
+  return {{"halfshade.version", HALFSHADE_VERSION},
+          {"halfshade.command", o.command_line},
+          {"halfshade.method", o.method},
+          {"halfshade.light_samples", std::to_string(o.light_samples)},
+          {"halfshade.seed", std::to_string(o.seed)},
+          {"halfshade.scene_hash", scene_hash(render.source.scene)},
           {"halfshade.mask_hash", hashes}};
 }
 
@@ -190,15 +197,16 @@ void write_picture_file(Render& render) {
   std::vector<std::vector<float>> visibility;
   for (const LightResult& light : render.lights) visibility.push_back(light.visibility);
   const std::vector<vec3> color = shade(render.gbuffer, render.mesh.frame, render.source.view, visibility);
-  const Picture picture = resolve(render.gbuffer, render.subsamples, render.mesh.frame, render.source.view, color, visibility);
+  const Picture picture =
+      resolve(render.gbuffer, render.subsamples, render.mesh.frame, render.source.view, color, visibility);
   render.resolve_ms = watch.lap();
   write_picture(render.options.output, picture, attributes(render));
   render.write_ms = watch.lap();
 }
 
 ordered_json parameters(const RenderOptions& o) {
-  return {{"name", o.method},   {"light_samples", o.light_samples}, {"pattern", o.pattern}, {"sets", o.sets},
-          {"seed", o.seed},     {"grid_resolution", o.grid},        {"exact", true}};
+  return {{"name", o.method}, {"light_samples", o.light_samples}, {"pattern", o.pattern}, {"sets", o.sets},
+          {"seed", o.seed},   {"grid_resolution", o.grid},        {"exact", true}};
 }
 
 ordered_json light_json(const Render& render, std::size_t index) {
@@ -214,7 +222,8 @@ ordered_json light_json(const Render& render, std::size_t index) {
                        {"receivers_umbra", light.umbra},
                        {"mask_bytes", light.masks.words.size() * 8},
                        {"mask_hash", light.masks.hash()}};
-  if (light.verified > 0) json["verify"] = {{"receivers", light.verified}, {"bits", light.verified_bits}, {"wrong_bits", light.wrong_bits}};
+  if (light.verified > 0)
+    json["verify"] = {{"receivers", light.verified}, {"bits", light.verified_bits}, {"wrong_bits", light.wrong_bits}};
   return json;
 }
 
@@ -228,8 +237,11 @@ ordered_json run_json(const Render& render) {
   json["method"] = parameters(o);
   json["size"] = {render.raster.width / render.subsamples, render.raster.height / render.subsamples};
   json["spp"] = o.spp;
-  json["milliseconds"] = {{"load", render.load_ms},           {"frame", render.frame_ms}, {"rasterize", render.rasterize_ms},
-                          {"resolve", render.resolve_ms}, {"write", render.write_ms}};
+  json["milliseconds"] = {{"load", render.load_ms},
+                          {"frame", render.frame_ms},
+                          {"rasterize", render.rasterize_ms},
+                          {"resolve", render.resolve_ms},
+                          {"write", render.write_ms}};
   json["rasterizer"] = {{"triangles_clipped", render.raster_stats.triangles_clipped},
                         {"triangles_binned", render.raster_stats.triangles_binned},
                         {"tile_entries", render.raster_stats.tile_entries},
@@ -257,10 +269,13 @@ void write_dumps(const Render& render) {
     const LightResult& light = render.lights[i];
     std::filesystem::path directory = render.options.dump;
     if (render.lights.size() > 1) directory /= render.source.view.lights[i].name;
-    ordered_json about = {{"schema", "halfshade.dump/1"}, {"command", render.options.command_line},
+    ordered_json about = {{"schema", "halfshade.dump/1"},
+                          {"command", render.options.command_line},
                           {"light", render.source.view.lights[i].name},
-                          {"width", render.raster.width / render.subsamples}, {"height", render.raster.height / render.subsamples},
-                          {"spp", render.options.spp}, {"method", parameters(render.options)}};
+                          {"width", render.raster.width / render.subsamples},
+                          {"height", render.raster.height / render.subsamples},
+                          {"spp", render.options.spp},
+                          {"method", parameters(render.options)}};
     write_dump(directory, render.mesh, light.receivers, receiver_pixels(render, light.receivers), light.samples,
                light.masks, about);
   }
@@ -268,18 +283,20 @@ void write_dumps(const Render& render) {
 
 void print_summary(const Render& render) {
   std::FILE* out = render.options.json == "-" ? stderr : stdout;
-  fmt::print(out, "scene      {}  {} triangles, {} lights\n", render.options.scene, render.source.scene.triangles.size(),
-             render.lights.size());
-  fmt::print(out, "picture    {}x{}, {} spp; load {:.0f} ms, rasterize {:.1f} ms\n", render.raster.width / render.subsamples,
-             render.raster.height / render.subsamples, render.options.spp, render.load_ms, render.rasterize_ms);
+  fmt::print(out, "scene      {}  {} triangles, {} lights\n", render.options.scene,
+             render.source.scene.triangles.size(), render.lights.size());
+  fmt::print(out, "picture    {}x{}, {} spp; load {:.0f} ms, rasterize {:.1f} ms\n",
+             render.raster.width / render.subsamples, render.raster.height / render.subsamples, render.options.spp,
+             render.load_ms, render.rasterize_ms);
   for (std::size_t i = 0; i < render.lights.size(); ++i) {
     const LightResult& l = render.lights[i];
     const ShadowStats& s = l.stats;
-    fmt::print(out, "light {:4} {} samples, {} receivers: {} lit, {} penumbra, {} umbra\n", render.source.view.lights[i].name,
-               l.samples.count, l.receivers.size(), l.lit, l.penumbra, l.umbra);
-    fmt::print(out, "shadows    {} {:.1f} ms (index {:.1f}, cull {:.1f}, test {:.1f})\n", render.options.method, l.shadow_ms,
-               s.index_ms, s.cull_ms, s.test_ms);
-    fmt::print(out, "exactness  {} of {} sample tests went to the exact predicate\n", s.exact_fallbacks, s.sample_tests);
+    fmt::print(out, "light {:4} {} samples, {} receivers: {} lit, {} penumbra, {} umbra\n",
+               render.source.view.lights[i].name, l.samples.count, l.receivers.size(), l.lit, l.penumbra, l.umbra);
+    fmt::print(out, "shadows    {} {:.1f} ms (index {:.1f}, cull {:.1f}, test {:.1f})\n", render.options.method,
+               l.shadow_ms, s.index_ms, s.cull_ms, s.test_ms);
+    fmt::print(out, "exactness  {} of {} sample tests went to the exact predicate\n", s.exact_fallbacks,
+               s.sample_tests);
     if (l.verified > 0) {
       fmt::print(out, "verify     {} receivers, {} bits, {} wrong\n", l.verified, l.verified_bits, l.wrong_bits);
     }
@@ -289,12 +306,16 @@ void print_summary(const Render& render) {
 }
 
 void print_warnings(const Render& render) {
-  for (const std::string& warning : render.source.report.warnings) fmt::print(stderr, "halfshade: warning: {}\n", warning);
-  if (render.source.view_was_made_up) fmt::print(stderr, "halfshade: no view file: camera and light were fitted to the scene\n");
+  for (const std::string& warning : render.source.report.warnings)
+    fmt::print(stderr, "halfshade: warning: {}\n", warning);
+  if (render.source.view_was_made_up)
+    fmt::print(stderr, "halfshade: no view file: camera and light were fitted to the scene\n");
   std::uint64_t translucent = 0;
-  for (const std::uint32_t m : render.source.scene.triangle_materials) translucent += render.source.scene.materials[m].opacity < 1.0f;
+  for (const std::uint32_t m : render.source.scene.triangle_materials)
+    translucent += render.source.scene.materials[m].opacity < 1.0f;
   if (translucent > 0) {
-    fmt::print(stderr, "halfshade: {} triangles have d < 1; {} treats them as opaque\n", translucent, render.options.method);
+    fmt::print(stderr, "halfshade: {} triangles have d < 1; {} treats them as opaque\n", translucent,
+               render.options.method);
   }
 }
 
@@ -303,7 +324,8 @@ int run(RenderOptions options) {
   render.options = std::move(options);
   const RenderOptions& o = render.options;
   if (!o.output.empty()) check_picture_path(o.output);
-  if (!(o.verify_percent >= 0.0 && o.verify_percent <= 100.0)) usage_error(fmt::format("--verify {} is not in 0..100", o.verify_percent));
+  if (!(o.verify_percent >= 0.0 && o.verify_percent <= 100.0))
+    usage_error(fmt::format("--verify {} is not in 0..100", o.verify_percent));
   if (!o.simd.empty()) force_simd_target(o.simd);
   shadow_config(o);  // names are checked before the scene is loaded
   parse_size(o, render);
@@ -343,13 +365,17 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code) 
   verb->add_option("--pattern", o->pattern, "Sample pattern: rows, uniform, stratified")->capture_default_str();
   verb->add_option("--sets", o->sets, "Different sample sets, chosen per pixel, 1..256")->capture_default_str();
   verb->add_option("--seed", o->seed, "Seed of patterns and sets")->capture_default_str();
-  verb->add_option("--grid", o->grid, "afsm: cells per axis of the light view, 16..2048 (0 = automatic)")->capture_default_str();
-  verb->add_option("--threads", o->threads, "Threads (0 = all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
+  verb->add_option("--grid", o->grid, "afsm: cells per axis of the light view, 16..2048 (0 = automatic)")
+      ->capture_default_str();
+  verb->add_option("--threads", o->threads, "Threads (0 = all cores)")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
   verb->add_option("--simd", o->simd, "Use only this instruction set (AVX3, AVX2, SSE4, ...)");
   verb->add_option("-o,--output", o->output, "Picture to write: .png or .exr");
   verb->add_option("--json", o->json, "Statistics as JSON to this file, or - for standard output");
   verb->add_option("--dump", o->dump, "Write receivers, samples, triangles and masks into this directory");
-  verb->add_option("--verify", o->verify_percent, "Check this percentage of the receivers with the oracle")->capture_default_str();
+  verb->add_option("--verify", o->verify_percent, "Check this percentage of the receivers with the oracle")
+      ->capture_default_str();
   verb->add_flag("--lenient", o->load.lenient, "Skip wrong faces of the OBJ and count them");
   verb->add_flag("--strict", o->load.strict, "Missing textures and materials are errors");
   verb->add_flag("--allow-path", o->load.allow_any_path, "Textures and materials may lie outside the OBJ's directory");

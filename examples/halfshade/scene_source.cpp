@@ -91,7 +91,7 @@ std::string scene_hash(const Scene& scene) {
   update(state, scene.triangle_uvs);
   update(state, scene.triangle_normals);
   for (const Material& m : scene.materials) {
-    const float numbers[8] = {m.diffuse.x, m.diffuse.y, m.diffuse.z, m.opacity,
+    const float numbers[8] = {m.diffuse.x,       m.diffuse.y,       m.diffuse.z,       m.opacity,
                               m.transmittance.x, m.transmittance.y, m.transmittance.z, m.alpha_cutoff};
     const std::uint32_t maps[2] = {m.color_map, m.alpha_map};
     XXH3_128bits_update(&state, numbers, sizeof numbers);

@@ -1,8 +1,8 @@
 // halfshade: exact soft shadows from area lights, and the rasterizer that goes with them.
 //
 // Space        right-handed; +y is up in the built-in scenes, no axis is special to the library. World coordinates are
-//              double; any unit. Light edge vectors are full lengths. Triangles wind counter-clockwise seen from outside,
-//              but both sides block light.
+//              double; any unit. Light edge vectors are full lengths. Triangles wind counter-clockwise seen from
+//              outside, but both sides block light.
 // Images       row 0 is the top; pixel (x, y) has its centre at (x + 0.5, y + 0.5).
 // Threads      work runs in the TBB arena of the calling thread. Const objects may be shared.
 // Determinism  equal inputs and configuration give equal bits for any number of threads and any instruction set.

@@ -24,22 +24,22 @@ struct AlphaMap {
 /// Lambert surface. A texel is opaque where alpha / 255 >= alpha_cutoff.
 struct Material {
   std::string name;
-  vec3 diffuse{0.8f};                // Kd, linear RGB
-  float opacity = 1.0f;              // d
-  vec3 transmittance{0.0f};          // Tf
-  std::uint32_t color_map = kNone;   // index into Scene::color_maps (map_Kd)
-  std::uint32_t alpha_map = kNone;   // index into Scene::alpha_maps (map_d)
+  vec3 diffuse{0.8f};               // Kd, linear RGB
+  float opacity = 1.0f;             // d
+  vec3 transmittance{0.0f};         // Tf
+  std::uint32_t color_map = kNone;  // index into Scene::color_maps (map_Kd)
+  std::uint32_t alpha_map = kNone;  // index into Scene::alpha_maps (map_d)
   float alpha_cutoff = 0.5f;
 };
 
 /// Indexed triangles. Positions are finite; indices are in range (the loaders check, Scene does not).
 struct Scene {
   std::string name;
-  std::vector<dvec3> positions;                           // world space
-  std::vector<std::array<std::uint32_t, 3>> triangles;    // [triangle] -> positions, counter-clockwise seen from outside
-  std::vector<std::uint32_t> triangle_materials;          // [triangle] -> materials
-  std::vector<std::array<vec2, 3>> triangle_uvs;          // [triangle][corner], or empty when no triangle has any
-  std::vector<std::array<vec3, 3>> triangle_normals;      // [triangle][corner] unit shading normals (zero = none), or empty
+  std::vector<dvec3> positions;                         // world space
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // [triangle] -> positions, counter-clockwise seen from outside
+  std::vector<std::uint32_t> triangle_materials;        // [triangle] -> materials
+  std::vector<std::array<vec2, 3>> triangle_uvs;        // [triangle][corner], or empty when no triangle has any
+  std::vector<std::array<vec3, 3>> triangle_normals;  // [triangle][corner] unit shading normals (zero = none), or empty
   std::vector<Material> materials;
   std::vector<ColorMap> color_maps;
   std::vector<AlphaMap> alpha_maps;

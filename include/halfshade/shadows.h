@@ -24,11 +24,12 @@ enum class SamplePattern {
 /// Defaults here, set by designated initialisers.
 struct ShadowConfig {
   ShadowMethod method = ShadowMethod::kAliasFreeShadowMap;
-  std::uint32_t light_sample_count = 256;       // 1..4096; point lights always use 1, explicit samples their own number
+  std::uint32_t light_sample_count = 256;  // 1..4096; point lights always use 1, explicit samples their own number
   SamplePattern pattern = SamplePattern::kRows;
-  std::uint32_t sample_sets = 1;                // 1..256 different sets, chosen per receiver by hash(pixel, seed)
-  std::uint32_t seed = 0;                       // same seed, same bits, on every platform
-  std::uint32_t grid_resolution = 0;            // afsm: cells per axis of the light view, 16..2048; 0 = chosen from the number of receivers
+  std::uint32_t sample_sets = 1;  // 1..256 different sets, chosen per receiver by hash(pixel, seed)
+  std::uint32_t seed = 0;         // same seed, same bits, on every platform
+  std::uint32_t grid_resolution =
+      0;  // afsm: cells per axis of the light view, 16..2048; 0 = chosen from the number of receivers
   /// Called now and then on the calling thread with the share done, 0..1; returning false stops the work: the call
   /// throws Error{kCancelled} and everything may be used again. May be empty.
   std::function<bool(double done)> progress = nullptr;
@@ -59,18 +60,18 @@ struct VisibilityMasks {
 
 /// Counters and times of one solve. Milliseconds are wall time.
 struct ShadowStats {
-  double index_ms = 0.0;    // receivers into the light view's lists
-  double cull_ms = 0.0;     // influence regions of the blockers
-  double test_ms = 0.0;     // blockers against receivers and samples
+  double index_ms = 0.0;  // receivers into the light view's lists
+  double cull_ms = 0.0;   // influence regions of the blockers
+  double test_ms = 0.0;   // blockers against receivers and samples
   std::uint64_t receivers = 0, triangles = 0;
-  std::uint64_t pairs_tested = 0;      // (blocker, receiver) pairs that reached the kernel
-  std::uint64_t pairs_sampled = 0;     // of these, tested sample by sample
-  std::uint64_t pairs_necessary = 0;   // of these, added at least one blocked bit
-  std::uint64_t sample_tests = 0;      // (blocker, receiver, sample) tests by the float filter
-  std::uint64_t exact_fallbacks = 0;   // of these, handed to the exact predicate
+  std::uint64_t pairs_tested = 0;                       // (blocker, receiver) pairs that reached the kernel
+  std::uint64_t pairs_sampled = 0;                      // of these, tested sample by sample
+  std::uint64_t pairs_necessary = 0;                    // of these, added at least one blocked bit
+  std::uint64_t sample_tests = 0;                       // (blocker, receiver, sample) tests by the float filter
+  std::uint64_t exact_fallbacks = 0;                    // of these, handed to the exact predicate
   std::uint64_t lists_occupied = 0, lists_longest = 0;  // light-view cells with receivers; most receivers in one
   std::uint64_t everywhere_blockers = 0;                // triangles without a bounded influence region
-  std::uint64_t bytes = 0;             // working memory of the method, without masks
+  std::uint64_t bytes = 0;                              // working memory of the method, without masks
 };
 
 /// A surface point that asks for the light.
@@ -79,11 +80,11 @@ struct Receiver {
   std::uint32_t triangle = kNone;  // the triangle it lies on, which never blocks it; kNone if none
 };
 
-/// Answers `blocks(triangle, receiver, sample)` for every receiver and every sample of `light`; masks in receiver order.
-/// Positions are rounded to the lattice of the scene's local frame first (docs/decisions/0001); the answer is the one of
-/// exact arithmetic on the rounded points. Receivers behind a one-sided light are marked blocked in every sample.
-/// Throws Error{kUsage} for a configuration out of range, Error{kBadInput} for non-finite positions.
-/// Runs in the calling thread's TBB arena. Distinct calls may run concurrently.
+/// Answers `blocks(triangle, receiver, sample)` for every receiver and every sample of `light`; masks in receiver
+/// order. Positions are rounded to the lattice of the scene's local frame first (docs/decisions/0001); the answer is
+/// the one of exact arithmetic on the rounded points. Receivers behind a one-sided light are marked blocked in every
+/// sample. Throws Error{kUsage} for a configuration out of range, Error{kBadInput} for non-finite positions. Runs in
+/// the calling thread's TBB arena. Distinct calls may run concurrently.
 void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                    const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats = nullptr);
 

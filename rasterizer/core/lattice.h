@@ -25,7 +25,9 @@ inline float snap_to_lattice(double x) {
   return static_cast<float>(std::nearbyint(x * 0x1p38) * 0x1p-38);
 }
 
-inline vec3 snap_to_lattice(const dvec3& p) { return {snap_to_lattice(p.x), snap_to_lattice(p.y), snap_to_lattice(p.z)}; }
+inline vec3 snap_to_lattice(const dvec3& p) {
+  return {snap_to_lattice(p.x), snap_to_lattice(p.y), snap_to_lattice(p.z)};
+}
 
 /// World <-> local. Built from the scene's box and the farthest point that must fit (lights, explicit receivers).
 /// Subtracting the box minimum first makes the frame independent of where the scene lies: fl(p - min) is the same

@@ -1,4 +1,5 @@
-// The scene's triangles on the lattice of the local frame: the geometry that the rasterizer draws and that blocks light.
+// The scene's triangles on the lattice of the local frame: the geometry that the rasterizer draws and that blocks
+// light.
 #pragma once
 
 #include "halfshade/scene.h"
@@ -8,7 +9,7 @@ namespace halfshade {
 
 /// Triangle numbers equal the scene's. The scene is referenced, not copied: it must outlive the mesh.
 struct LatticeMesh {
-  const Scene* scene = nullptr;                         // materials, uvs, normals, textures; may be null in tests
+  const Scene* scene = nullptr;  // materials, uvs, normals, textures; may be null in tests
   LocalFrame frame;
   std::vector<vec3> positions;                          // local frame, on the lattice
   std::vector<std::array<std::uint32_t, 3>> triangles;  // [triangle] -> positions

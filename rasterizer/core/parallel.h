@@ -37,10 +37,11 @@ class FpEnvironment {
 /// body(begin, end) over pieces of [0, count) of at least `grain` items (except the last).
 template <class Body>
 void parallel_ranges(std::size_t count, std::size_t grain, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const tbb::blocked_range<std::size_t>& range) {
-    const FpEnvironment environment;
-    body(range.begin(), range.end());
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      const FpEnvironment environment;
+                      body(range.begin(), range.end());
+                    });
 }
 
 /// body(i) for every i in [0, count), each its own task: for pieces of work that are large and uneven.

@@ -18,10 +18,14 @@ inline dvec2 unit_circle(double turns) {
   for (int k = 17; k >= 1; k -= 2) c = 1.0 - c * x2 / (k * (k + 1.0));
   s *= x;
   switch (static_cast<long long>(quarter) & 3) {
-    case 0: return {c, s};
-    case 1: return {-s, c};
-    case 2: return {-c, -s};
-    default: return {s, -c};
+    case 0:
+      return {c, s};
+    case 1:
+      return {-s, c};
+    case 2:
+      return {-c, -s};
+    default:
+      return {s, -c};
   }
 }
 

@@ -20,8 +20,8 @@ int big_orient3d(const vec3& a, const vec3& b, const vec3& c, const vec3& d) {
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) m[i][k] = Big(lattice_units(rows[i][k])) - Big(lattice_units(d[k]));
   }
-  const Big det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-                  m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  const Big det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                  m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
   return det.sign();
 }
 
@@ -35,13 +35,15 @@ TEST_CASE("orient3d has the sign of unlimited integers, for ordinary, nearly fla
     const double reach = i % 3 == 0 ? 2.0 : (i % 3 == 1 ? 1e-3 : 0x1p-30);
     const vec3 a = lattice_point(random, reach), b = lattice_point(random, reach), c = lattice_point(random, reach);
     vec3 d = lattice_point(random, reach);
-    if (i % 2 == 0) d = snap_to_lattice(dvec3(a) + random.uniform(0, 1) * dvec3(b - a) + random.uniform(0, 1) * dvec3(c - a));
+    if (i % 2 == 0)
+      d = snap_to_lattice(dvec3(a) + random.uniform(0, 1) * dvec3(b - a) + random.uniform(0, 1) * dvec3(c - a));
     d = glm::clamp(d, vec3(-2.0f), vec3(2.0f));
     REQUIRE(orient3d(a, b, c, d) == big_orient3d(a, b, c, d));
     REQUIRE(sign_of(orient3d_exact(a, b, c, d)) == big_orient3d(a, b, c, d));
   }
   const vec3 corner[4] = {{2, 2, 2}, {-2, -2, 2}, {-2, 2, -2}, {2, -2, -2}};
-  CHECK(orient3d(corner[0], corner[1], corner[2], corner[3]) == big_orient3d(corner[0], corner[1], corner[2], corner[3]));
+  CHECK(orient3d(corner[0], corner[1], corner[2], corner[3]) ==
+        big_orient3d(corner[0], corner[1], corner[2], corner[3]));
 }
 
 TEST_CASE("blocks does not depend on the order of the corners or the direction of the segment") {

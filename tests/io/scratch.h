@@ -50,6 +50,9 @@ inline std::string read_bytes(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
+/// Refusals take milliseconds; the limit of one second has room for a busy machine.
+inline constexpr double kHang = 5.0;
+
 struct Outcome {
   bool threw = false;
   ErrorCode code{};

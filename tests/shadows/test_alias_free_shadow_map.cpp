@@ -43,8 +43,8 @@ Light light_of_shape(LightShape shape, Random& random) {
 }  // namespace
 
 TEST_CASE("masks equal the oracle for every light shape among random triangles") {
-  for (const LightShape shape : {LightShape::kPoint, LightShape::kRectangle, LightShape::kDisk, LightShape::kSphere,
-                                 LightShape::kSamples}) {
+  for (const LightShape shape :
+       {LightShape::kPoint, LightShape::kRectangle, LightShape::kDisk, LightShape::kSphere, LightShape::kSamples}) {
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
       CAPTURE(static_cast<int>(shape));
       CAPTURE(seed);
@@ -116,7 +116,8 @@ TEST_CASE("a blocker behind the light hides nothing") {
   const Scene scene = scene_of(quad({-9, 5, -9}, {9, 5, -9}, {9, 5, 9}, {-9, 5, 9}));
   Random random(1);
   const auto receivers = receivers_at(random_points(random, 100, -3.0, 3.0));
-  const VisibilityMasks masks = solve(scene, receivers, frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks =
+      solve(scene, receivers, frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
   for (std::size_t i = 0; i < receivers.size(); ++i) CHECK(masks.visibility(i) == 1.0f);
 }
 
@@ -124,7 +125,8 @@ TEST_CASE("a closed box around the light hides it entirely") {
   const Scene scene = scene_of(box({-3, 3, -3}, {3, 5, 3}));
   Random random(2);
   const auto receivers = receivers_at(random_points(random, 200, -8.0, 2.9));
-  const VisibilityMasks masks = solve(scene, receivers, frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks =
+      solve(scene, receivers, frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
   for (std::size_t i = 0; i < receivers.size(); ++i) CHECK(masks.visibility(i) == 0.0f);
 }
 
@@ -153,5 +155,6 @@ TEST_CASE("an empty scene, no receivers and a configuration out of range are han
   ShadowConfig config = frame_config();
   config.grid_resolution = 5000;
   CHECK_THROWS_AS(solve(empty, one, frame_light(), config, ShadowMethod::kAliasFreeShadowMap), Error);
-  CHECK_THROWS_AS(solve(empty, receivers_at({{NAN, 0, 0}}), frame_light(), frame_config(), ShadowMethod::kOracle), Error);
+  CHECK_THROWS_AS(solve(empty, receivers_at({{NAN, 0, 0}}), frame_light(), frame_config(), ShadowMethod::kOracle),
+                  Error);
 }

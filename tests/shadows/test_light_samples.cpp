@@ -10,9 +10,7 @@ using namespace halfshade::test;
 
 namespace {
 
-LocalFrame unit_frame() {
-  return make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, {});
-}
+LocalFrame unit_frame() { return make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, {}); }
 
 LightSamples samples_of(const Light& light, std::uint32_t count, SamplePattern pattern, std::uint32_t sets = 1) {
   ShadowConfig config = frame_config(count);
@@ -77,7 +75,9 @@ TEST_CASE("samples lie on their light: rectangle, disk, sphere; sets differ") {
   Light light = frame_light();
   const LightSamples rectangle = samples_of(light, 100, SamplePattern::kRows, 4);
   CHECK(rectangle.points.size() == 400);
-  CHECK(std::set<float>{rectangle.points[0].x, rectangle.points[100].x, rectangle.points[200].x, rectangle.points[300].x}.size() == 4);
+  CHECK(
+      std::set<float>{rectangle.points[0].x, rectangle.points[100].x, rectangle.points[200].x, rectangle.points[300].x}
+          .size() == 4);
   for (const vec3& p : rectangle.points) {
     CHECK(p.y == 0.5f);
     CHECK(std::fabs(p.x) <= 0.125f);

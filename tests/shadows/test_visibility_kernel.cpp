@@ -26,7 +26,8 @@ struct Mixture {
     for (int i = 0; i < 40; ++i) {
       const dvec3 c(random.uniform(-2, 2), random.uniform(0, 4.2), random.uniform(-2, 2));
       const double size = i % 2 == 0 ? 0.2 : 2.0;
-      triangles.push_back({c + size * random.in_box(-1, 1), c + size * random.in_box(-1, 1), c + size * random.in_box(-1, 1)});
+      triangles.push_back(
+          {c + size * random.in_box(-1, 1), c + size * random.in_box(-1, 1), c + size * random.in_box(-1, 1)});
     }
     triangles.push_back({dvec3(-4, 2, -4), dvec3(4, 2, -4), dvec3(0, 2, 4)});  // edges through sample columns
     triangles.push_back({dvec3(1, 1, 1), dvec3(1, 1, 1), dvec3(2, 1, 1)});     // no area
@@ -47,8 +48,8 @@ struct Mixture {
     receivers.count = count;
     receivers.words = kernel_samples.padded / 64;
     for (std::size_t i = 0; i < padded; ++i) {
-      const vec3 p = mesh.frame.to_lattice({std::round(random.uniform(-16, 16)) / 4.0, random.uniform(-1, 1) < 0 ? 0.0 : 1.0,
-                                            random.uniform(-4, 4)});
+      const vec3 p = mesh.frame.to_lattice(
+          {std::round(random.uniform(-16, 16)) / 4.0, random.uniform(-1, 1) < 0 ? 0.0 : 1.0, random.uniform(-4, 4)});
       receivers.x.push_back(p.x), receivers.y.push_back(p.y), receivers.z.push_back(p.z);
       receivers.own.push_back(i % 7 == 0 ? static_cast<std::uint32_t>(i % mesh.triangles.size()) : kNone);
       receivers.open.push_back(~0u);

@@ -22,7 +22,8 @@ struct Outcome {
 };
 
 /// Renders the view's first light and checks one receiver in `every` with the oracle.
-Outcome check_scene(const Scene& scene, const View& view, std::uint32_t size, std::uint32_t samples, std::uint32_t every) {
+Outcome check_scene(const Scene& scene, const View& view, std::uint32_t size, std::uint32_t samples,
+                    std::uint32_t every) {
   const Light& light = view.lights.at(0);
   const LatticeMesh mesh = make_lattice_mesh(scene, make_local_frame(scene.positions, light_extent(light)));
   GBuffer gbuffer;

@@ -54,7 +54,8 @@ template <class Near>
 bool blocked_by(const Sphere& sphere, const dvec3& r, const dvec3& l, const Near& near) {
   for (const auto& f : sphere.faces) {
     if (!near(f)) continue;
-    if (blocks(vec3(sphere.vertices[f[0]]), vec3(sphere.vertices[f[1]]), vec3(sphere.vertices[f[2]]), vec3(r), vec3(l))) return true;
+    if (blocks(vec3(sphere.vertices[f[0]]), vec3(sphere.vertices[f[1]]), vec3(sphere.vertices[f[2]]), vec3(r), vec3(l)))
+      return true;
   }
   return false;
 }
@@ -92,7 +93,8 @@ TEST_CASE("S01 vertex_aim: segments through the vertices of a closed sphere neve
       bool hit = false;
       for (const std::size_t f : faces_at[v]) {
         const auto& t = sphere.faces[f];
-        hit = hit || blocks(vec3(sphere.vertices[t[0]]), vec3(sphere.vertices[t[1]]), vec3(sphere.vertices[t[2]]), from, to);
+        hit = hit ||
+              blocks(vec3(sphere.vertices[t[0]]), vec3(sphere.vertices[t[1]]), vec3(sphere.vertices[t[2]]), from, to);
       }
       leaks += !hit;
     }
@@ -160,7 +162,8 @@ std::uint32_t half_plane_count(double x) {
 TEST_CASE("S03 halfplane_exact: the number of blocked samples is the closed form, ties included") {
   const std::vector<dvec3> points = half_plane_receivers();
   for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
-    const VisibilityMasks masks = solve(scene_of(half_plane()), receivers_at(points), frame_light(), frame_config(), method);
+    const VisibilityMasks masks =
+        solve(scene_of(half_plane()), receivers_at(points), frame_light(), frame_config(), method);
     for (std::size_t i = 0; i < points.size(); ++i) {
       CAPTURE(points[i].x);
       CHECK(masks.blocked_count(i) == half_plane_count(points[i].x));
@@ -214,7 +217,8 @@ struct Moved {
   Light light;
 };
 
-Moved moved(const std::vector<Triangle>& triangles, const std::vector<dvec3>& points, const dvec3& offset, double scale) {
+Moved moved(const std::vector<Triangle>& triangles, const std::vector<dvec3>& points, const dvec3& offset,
+            double scale) {
   Moved m{scene_of(triangles), receivers_at(points), frame_light()};
   for (dvec3& p : m.scene.positions) p = p * scale + offset;
   for (Receiver& r : m.receivers) r.position_world = r.position_world * scale + offset;
@@ -247,8 +251,10 @@ TEST_CASE("S06 far_origin: offsets that round change at most 0.1 percent of the 
   }
   const std::vector<dvec3> points = half_plane_receivers();
   const Moved home = moved(triangles, points, dvec3(0.0), 1.0), far = moved(triangles, points, dvec3(1e6 / 3.0), 1.0);
-  const VisibilityMasks a = solve(home.scene, home.receivers, home.light, frame_config(), ShadowMethod::kAliasFreeShadowMap);
-  const VisibilityMasks b = solve(far.scene, far.receivers, far.light, frame_config(), ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks a =
+      solve(home.scene, home.receivers, home.light, frame_config(), ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks b =
+      solve(far.scene, far.receivers, far.light, frame_config(), ShadowMethod::kAliasFreeShadowMap);
   CHECK(static_cast<double>(wrong_bits(a, b)) <= 0.001 * 256.0 * static_cast<double>(points.size()));
 }
 
@@ -256,10 +262,12 @@ TEST_CASE("S07 scale: scaling by powers of two from 2^-60 to 2^60 changes no bit
   const std::vector<Triangle> triangles = joined(half_plane(), scattered_triangles(8, 200));
   const std::vector<dvec3> points = half_plane_receivers();
   const Moved home = moved(triangles, points, dvec3(0.0), 1.0);
-  const VisibilityMasks masks = solve(home.scene, home.receivers, home.light, frame_config(), ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks =
+      solve(home.scene, home.receivers, home.light, frame_config(), ShadowMethod::kAliasFreeShadowMap);
   for (const double scale : {0x1p-60, 0x1p-20, 0x1p20, 0x1p60}) {
     const Moved m = moved(triangles, points, dvec3(0.0), scale);
-    CHECK(wrong_bits(masks, solve(m.scene, m.receivers, m.light, frame_config(), ShadowMethod::kAliasFreeShadowMap)) == 0);
+    CHECK(wrong_bits(masks, solve(m.scene, m.receivers, m.light, frame_config(), ShadowMethod::kAliasFreeShadowMap)) ==
+          0);
   }
 }
 

@@ -19,7 +19,8 @@ namespace {
 std::vector<dvec3> floor_points(int side, double reach) {
   std::vector<dvec3> points;
   for (int i = 0; i < side * side; ++i) {
-    points.push_back({((i % side) * 2.0 / (side - 1) - 1.0) * reach, 0.0, ((i / side) * 2.0 / (side - 1) - 1.0) * reach});
+    points.push_back(
+        {((i % side) * 2.0 / (side - 1) - 1.0) * reach, 0.0, ((i / side) * 2.0 / (side - 1) - 1.0) * reach});
   }
   return points;
 }
@@ -33,7 +34,8 @@ std::vector<Triangle> plate(double y) { return quad({-1, y, -1}, {1, y, -1}, {1,
 
 ShadowStats stats_of(const std::vector<Triangle>& triangles, const std::vector<dvec3>& points) {
   ShadowStats stats;
-  solve(scene_of(triangles), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap, &stats);
+  solve(scene_of(triangles), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap,
+        &stats);
   return stats;
 }
 
@@ -41,8 +43,8 @@ ShadowStats stats_of(const std::vector<Triangle>& triangles, const std::vector<d
 
 TEST_CASE("S08 coplanar: receivers in the plane of a card are not blocked by it, tilted cards give the oracle's bits") {
   const auto card = quad({-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1});
-  const VisibilityMasks masks = solve(scene_of(card), receivers_at(floor_points(11, 1.5)), frame_light(), frame_config(),
-                                      ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks = solve(scene_of(card), receivers_at(floor_points(11, 1.5)), frame_light(),
+                                      frame_config(), ShadowMethod::kAliasFreeShadowMap);
   for (std::size_t i = 0; i < masks.receiver_count; ++i) CHECK(masks.blocked_count(i) == 0);
   for (const double slope : {1e-7, 1e-5, 1e-3, 0.1, 0.577}) {
     std::vector<Triangle> tilted = card;
@@ -116,7 +118,8 @@ TEST_CASE("S09 lone_plane_acne: a convex sphere does not block samples above a f
   for (std::size_t i = 0; i < run.receivers.size(); ++i) {
     bool all_above = true;
     for (const vec3& l : run.samples.set(0)) {
-      all_above = all_above && glm::dot(dvec3(l) - dvec3(run.receivers.position[i]), dvec3(run.receivers.normal[i])) > 0.0;
+      all_above =
+          all_above && glm::dot(dvec3(l) - dvec3(run.receivers.position[i]), dvec3(run.receivers.normal[i])) > 0.0;
     }
     if (all_above) blocked_above += run.masks.blocked_count(i);
   }
@@ -126,11 +129,12 @@ TEST_CASE("S09 lone_plane_acne: a convex sphere does not block samples above a f
 TEST_CASE("S10 behind_light_vertex: a triangle that reaches through the light's plane hides the receiver beyond it") {
   const std::vector<Triangle> crossing = {{dvec3(2, 3, 0), dvec3(2, 5, 0.5), dvec3(2, 3, 1)}};
   std::vector<dvec3> points = {{20, 0, 0.5}};
-  const VisibilityMasks masks = solve(scene_of(crossing), receivers_at(points), frame_light(), frame_config(),
-                                      ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks =
+      solve(scene_of(crossing), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
   CHECK(masks.blocked_count(0) > 0);
   Random random(10);
-  for (int i = 0; i < 40; ++i) points.push_back({random.uniform(-30, 30), random.uniform(-2, 3.99), random.uniform(-30, 30)});
+  for (int i = 0; i < 40; ++i)
+    points.push_back({random.uniform(-30, 30), random.uniform(-2, 3.99), random.uniform(-30, 30)});
   for (int i = 0; i < 1000; ++i) {
     const dvec3 c(random.uniform(-4, 4), 4.0, random.uniform(-4, 4));
     const Triangle t = {c + random.in_box(-3, 3), c + random.in_box(-3, 3), c + random.in_box(-1, 1)};
@@ -143,8 +147,8 @@ TEST_CASE("S11 light_in_triangle: coplanar triangles block nothing, piercing one
   const std::vector<Triangle> piercing = {{dvec3(-0.5, 3, 0), dvec3(0.5, 5, 0), dvec3(0, 4, 1)}};
   const std::vector<Triangle> below = {{dvec3(-0.5, 3, 0), dvec3(0.5, 3, 0), dvec3(0, 3, 1)}};
   const std::vector<dvec3> points = floor_points(40, 6.0);
-  const VisibilityMasks masks = solve(scene_of(coplanar), receivers_at(points), frame_light(), frame_config(),
-                                      ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks =
+      solve(scene_of(coplanar), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
   for (std::size_t i = 0; i < points.size(); ++i) CHECK(masks.blocked_count(i) == 0);
   CHECK(wrong_in_frame(piercing, points) == 0);
   CHECK(stats_of(piercing, points).pairs_tested <= 3 * stats_of(below, points).pairs_tested);
@@ -153,19 +157,21 @@ TEST_CASE("S11 light_in_triangle: coplanar triangles block nothing, piercing one
 TEST_CASE("S12 receiver_behind_light: receivers at and behind a one-sided light see nothing of it") {
   const std::vector<dvec3> points = {{0, 5, 0}, {3, 4, 0}, {0, 4, 0}};
   for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
-    const VisibilityMasks masks = solve(scene_of(plate(2)), receivers_at(points), frame_light(), frame_config(), method);
+    const VisibilityMasks masks =
+        solve(scene_of(plate(2)), receivers_at(points), frame_light(), frame_config(), method);
     for (std::size_t i = 0; i < points.size(); ++i) CHECK(masks.visibility(i) == 0.0f);
   }
 }
 
 TEST_CASE("S13 light_in_box: a closed box around the light hides it from outside, not from inside") {
   const auto around = box({-3, 3, -3}, {3, 4.5, 3});
-  const VisibilityMasks outside = solve(scene_of(around), receivers_at(floor_points(9, 8.0)), frame_light(), frame_config(),
-                                        ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks outside = solve(scene_of(around), receivers_at(floor_points(9, 8.0)), frame_light(),
+                                        frame_config(), ShadowMethod::kAliasFreeShadowMap);
   for (std::size_t i = 0; i < outside.receiver_count; ++i) CHECK(outside.visibility(i) == 0.0f);
   Random random(13);
   std::vector<dvec3> inside;
-  for (int i = 0; i < 200; ++i) inside.push_back({random.uniform(-2.9, 2.9), random.uniform(3.01, 3.9), random.uniform(-2.9, 2.9)});
+  for (int i = 0; i < 200; ++i)
+    inside.push_back({random.uniform(-2.9, 2.9), random.uniform(3.01, 3.9), random.uniform(-2.9, 2.9)});
   CHECK(wrong_in_frame(around, inside) == 0);
 }
 
@@ -175,7 +181,10 @@ TEST_CASE("S14 inside_room: a room seen from inside does not depend on its windi
   std::vector<dvec3> points = floor_points(12, 5.0);
   for (int i = 0; i < 100; ++i) points.push_back(random.in_box(-7.9, 7.9));
   CHECK(wrong_in_frame(room, points) == 0);
-  const auto run = [&] { return solve(scene_of(room), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap); };
+  const auto run = [&] {
+    return solve(scene_of(room), receivers_at(points), frame_light(), frame_config(),
+                 ShadowMethod::kAliasFreeShadowMap);
+  };
   const VisibilityMasks masks = run();
   for (Triangle& t : room) std::swap(t[1], t[2]);
   CHECK(wrong_bits(masks, run()) == 0);
@@ -201,13 +210,15 @@ TEST_CASE("S16 zero_light: point, segment and tiny square lights give the hard s
   const auto points = floor_points(21, 4.9);  // none on the edge of the hard shadow
   Light point = frame_light();
   point.shape = LightShape::kPoint;
-  const VisibilityMasks hard = solve(scene_of(triangles), receivers_at(points), point, frame_config(), ShadowMethod::kOracle);
+  const VisibilityMasks hard =
+      solve(scene_of(triangles), receivers_at(points), point, frame_config(), ShadowMethod::kOracle);
   for (const double side : {0.0, 0x1p-40, 0x1p-30}) {
     Light tiny = frame_light();
     tiny.u *= side;
     tiny.v *= side;
     CHECK(wrong_in_frame(triangles, points, tiny) == 0);
-    const VisibilityMasks masks = solve(scene_of(triangles), receivers_at(points), tiny, frame_config(), ShadowMethod::kAliasFreeShadowMap);
+    const VisibilityMasks masks =
+        solve(scene_of(triangles), receivers_at(points), tiny, frame_config(), ShadowMethod::kAliasFreeShadowMap);
     for (std::size_t i = 0; i < points.size(); ++i) CHECK(masks.blocked_count(i) == 256 * hard.blocked_count(i));
   }
   for (const LightShape shape : {LightShape::kDisk, LightShape::kSphere}) {
@@ -237,7 +248,8 @@ TEST_CASE("S17 N_sweep: any number of samples from 1 to 4096") {
 TEST_CASE("S18 both_sides_lit: a triangle whose plane holds the light's centre shadows both sides alike") {
   const std::vector<Triangle> t = {{dvec3(0, 1, -1), dvec3(0, 1, 1), dvec3(0, 3, 0)}};
   for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
-    const VisibilityMasks masks = solve(scene_of(t), receivers_at({{0.5, 0, 0}, {-0.5, 0, 0}}), frame_light(), frame_config(), method);
+    const VisibilityMasks masks =
+        solve(scene_of(t), receivers_at({{0.5, 0, 0}, {-0.5, 0, 0}}), frame_light(), frame_config(), method);
     CHECK(masks.blocked_count(0) == 88);
     CHECK(masks.blocked_count(1) == 88);
     for (std::uint32_t i = 0; i < 256; ++i) CHECK(masks.blocked(0, i) == masks.blocked(1, i / 16 * 16 + 15 - i % 16));
@@ -276,7 +288,8 @@ TEST_CASE("S20 alpha_ties: texel borders, wrapping and alpha equal to the thresh
   CHECK(opaque_threshold(0.0f) == 0);
   CHECK(opaque_threshold(1.0f) == 255);
   const Scene scene = alpha_card(0.5f, {0, 0}, {1, 1});
-  const LatticeMesh mesh = make_lattice_mesh(scene, make_local_frame(scene.positions, std::vector<dvec3>{{0, 4, 0}, {0, 0, 0}}));
+  const LatticeMesh mesh =
+      make_lattice_mesh(scene, make_local_frame(scene.positions, std::vector<dvec3>{{0, 4, 0}, {0, 0, 0}}));
   // Straight up through (x, z) in [-1, 1]^2: u = (x + 1) / 2, v = (z + 1) / 2; texel = floor(4 u), row 0 at v = 1.
   for (int i = -8; i <= 8; ++i) {
     for (int k = -8; k <= 8; ++k) {
@@ -293,7 +306,8 @@ TEST_CASE("S20 alpha_ties: texel borders, wrapping and alpha equal to the thresh
   }
   const auto points = floor_points(9, 1.0);
   for (const float cutoff : {0.0f, 0.2f, 0.5f, 119.0f / 255.0f, 1.0f}) {
-    for (const dvec2 span : {dvec2(0, 1), dvec2(-0.0, 1), dvec2(-3.5, 4.25), dvec2(1e6, 1e6 + 3), dvec2(1e9, 1e9 + 1024)}) {
+    for (const dvec2 span :
+         {dvec2(0, 1), dvec2(-0.0, 1), dvec2(-3.5, 4.25), dvec2(1e6, 1e6 + 3), dvec2(1e9, 1e9 + 1024)}) {
       CHECK(wrong_bits_of_exact_methods(alpha_card(cutoff, {span.x, span.x}, {span.y, span.y}), receivers_at(points),
                                         frame_light(), frame_config()) == 0);
     }
@@ -326,7 +340,8 @@ TEST_CASE("S29 isa_threads: masks do not depend on instruction set, threads or t
       for (const int threads : {1, 2, 3, 7}) {
         VisibilityMasks masks;
         tbb::task_arena(threads).execute([&] {
-          masks = solve(scene_of(triangles), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
+          masks = solve(scene_of(triangles), receivers_at(points), frame_light(), frame_config(),
+                        ShadowMethod::kAliasFreeShadowMap);
         });
         hashes.push_back(masks.hash());
       }
@@ -354,7 +369,8 @@ TEST_CASE("S31 conservative_fuzz: no blocker is ever left out of a list, degener
       triangles.push_back(t);
     }
     std::vector<dvec3> points;
-    for (int i = 0; i < 25; ++i) points.push_back({coordinate(i % 5 == 0), coordinate(i % 5 == 0), coordinate(i % 5 == 0)});
+    for (int i = 0; i < 25; ++i)
+      points.push_back({coordinate(i % 5 == 0), coordinate(i % 5 == 0), coordinate(i % 5 == 0)});
     Light light = frame_light();
     light.shape = static_cast<LightShape>(round % 4);
     light.two_sided = round % 3 == 0;

@@ -77,7 +77,8 @@ inline VisibilityMasks solve(const Scene& scene, const std::vector<Receiver>& re
 inline std::uint64_t wrong_bits(const VisibilityMasks& a, const VisibilityMasks& b) {
   if (a.words.size() != b.words.size()) return ~std::uint64_t{0};
   std::uint64_t count = 0;
-  for (std::size_t i = 0; i < a.words.size(); ++i) count += static_cast<std::uint64_t>(std::popcount(a.words[i] ^ b.words[i]));
+  for (std::size_t i = 0; i < a.words.size(); ++i)
+    count += static_cast<std::uint64_t>(std::popcount(a.words[i] ^ b.words[i]));
   return count;
 }
 
