@@ -26,7 +26,7 @@ namespace {
 using nlohmann::ordered_json;
 
 struct Options {
-  std::vector<std::string> scenes, methods = {"afsm"};
+  std::vector<std::string> scenes, methods = {"exact", "afsm"};
   std::vector<double> light_scales;
   std::string size = "512x512", pattern = "rows", shared_scenes, json, modes = "best";
   std::uint32_t light_samples = 256, sets = 1, seed = 0;

@@ -3,6 +3,7 @@
 #include <hwy/cache_control.h>
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 
 #include "halfshade/error.h"
 #include "rasterizer/attributes.h"
@@ -33,9 +34,16 @@ void check_range(const char* axis, std::uint32_t begin, std::uint32_t end, std::
                                      std::to_string(side));
 }
 
+void check_offset(const dvec2& offset) {
+  if (std::fabs(offset.x) <= 1.0 && std::fabs(offset.y) <= 1.0) return;
+  throw Error(ErrorCode::kUsage, "rasterize: subpixel_offset is (" + std::to_string(offset.x) + ", " +
+                                     std::to_string(offset.y) + "), allowed: -1 to 1");
+}
+
 PixelWindow checked_window(const RasterConfig& config) {
   check_side("width", config.width);
   check_side("height", config.height);
+  check_offset(config.subpixel_offset);
   const PixelWindow& window = config.window;
   if ((window.x0 | window.x1 | window.y0 | window.y1) == 0) return {0, config.width, 0, config.height};
   check_range("x", window.x0, window.x1, config.width);
@@ -184,13 +192,34 @@ void draw_tiles(const LatticeMesh& mesh, const CameraFrame& camera, const Triang
   stats.samples_covered = samples_covered.load();
 }
 
+// The digits of `index` in `base`, mirrored at the point (van der Corput): in [0, 1). Exact up to the division.
+double radical_inverse(std::uint32_t index, std::uint32_t base) {
+  std::uint64_t mirrored = 0, scale = 1;
+  for (; index != 0; index /= base) {
+    mirrored = mirrored * base + index % base;
+    scale *= base;
+  }
+  return static_cast<double>(mirrored) / static_cast<double>(scale);
+}
+
+double centered(double unit) { return unit < 0.5 ? unit : unit - 1.0; }
+
 }  // namespace
+
+// Halton's sequence in bases 3 and 5: the sets of light samples follow a sequence in base 2, and pictures average over
+// both at once, so the two must not move in step.
+dvec2 subpixel_jitter(std::uint32_t frame) {
+  return {centered(radical_inverse(frame, 3)), centered(radical_inverse(frame, 5))};
+}
 
 void rasterize(const LatticeMesh& mesh, const Camera& camera, const RasterConfig& config, GBuffer& gbuffer,
                RasterStats* stats) {
   const FpEnvironment environment;
   const PixelWindow window = checked_window(config);
-  const CameraFrame frame = make_camera_frame(camera, mesh.frame, config.width, config.height);
+  CameraFrame frame = make_camera_frame(camera, mesh.frame, config.width, config.height);
+  // Projection and rays both go through the centre, so moving it moves them alike.
+  frame.center_x_px -= config.subpixel_offset.x;
+  frame.center_y_px -= config.subpixel_offset.y;
   const TileGrid grid = make_tile_grid(window);
 
   RasterStats counted;

@@ -8,12 +8,11 @@
 namespace halfshade {
 namespace {
 
-/// Centre of a light that stands for all of it in the cosine.
-dvec3 light_center(const Light& light) {
-  if (light.shape != LightShape::kSamples) return light.center;
+vec3 emission_of(const Light& light) {
+  if (light.emission_image.empty()) return light.emission;
   dvec3 sum(0.0);
-  for (const dvec3& p : light.points) sum += p;
-  return sum / static_cast<double>(light.points.size());
+  for (const vec3& color : light.emission_image.rgb) sum += dvec3(color);
+  return vec3(sum / static_cast<double>(light.emission_image.rgb.size()));
 }
 
 vec3 unit(const dvec3& v) {
@@ -21,12 +20,40 @@ vec3 unit(const dvec3& v) {
   return length > 0.0 ? vec3(v / length) : vec3(0.0f);
 }
 
+float cosine_towards(const dvec3& center, const GBuffer& gbuffer, std::size_t entry) {
+  return std::max(0.0f, glm::dot(gbuffer.shading_normal[entry], unit(center - gbuffer.position[entry])));
+}
+
 }  // namespace
 
+dvec3 light_center(const Light& light) {
+  if (light.shape != LightShape::kSamples && light.shape != LightShape::kPolygon) return light.center;
+  dvec3 sum(0.0);
+  for (const dvec3& p : light.points) sum += p;
+  return sum / static_cast<double>(light.points.size());
+}
+
+std::vector<vec3> light_response(const GBuffer& gbuffer, const LocalFrame& frame, const Light& light,
+                                 std::span<const float> cosines) {
+  const dvec3 center = frame.to_local(light_center(light));
+  std::vector<vec3> response(gbuffer.size(), vec3(0.0f));
+  for (std::size_t i = 0; i < gbuffer.size(); ++i) {
+    if (gbuffer.triangle[i] == kNone) continue;
+    response[i] = gbuffer.albedo[i] * (cosines.empty() ? cosine_towards(center, gbuffer, i) : cosines[i]);
+  }
+  return response;
+}
+
 std::vector<vec3> shade(const GBuffer& gbuffer, const LocalFrame& frame, const View& view,
-                        std::span<const std::vector<float>> visibility, const Ambient& ambient) {
+                        std::span<const std::vector<float>> visibility, const Ambient& ambient,
+                        std::span<const std::vector<vec3>> visible_emission,
+                        std::span<const std::vector<float>> cosines) {
   std::vector<dvec3> centers;
-  for (const Light& light : view.lights) centers.push_back(frame.to_local(light_center(light)));
+  std::vector<vec3> emissions;
+  for (const Light& light : view.lights) {
+    centers.push_back(frame.to_local(light_center(light)));
+    emissions.push_back(emission_of(light));
+  }
   const vec3 up = unit(view.camera.up);
   std::vector<vec3> color(gbuffer.size(), kBackground);
   parallel_ranges(gbuffer.size(), 16384, [&](std::size_t begin, std::size_t end) {
@@ -36,8 +63,9 @@ std::vector<vec3> shade(const GBuffer& gbuffer, const LocalFrame& frame, const V
       const float sky = 0.5f + 0.5f * glm::dot(normal, up);
       vec3 light = ambient.ground + (ambient.sky - ambient.ground) * sky;
       for (std::size_t k = 0; k < centers.size(); ++k) {
-        const float cosine = std::max(0.0f, glm::dot(normal, unit(centers[k] - gbuffer.position[i])));
-        light += view.lights[k].emission * (cosine * visibility[k][i]);
+        const float cosine = k < cosines.size() ? cosines[k][i] : cosine_towards(centers[k], gbuffer, i);
+        const bool weighted = k < visible_emission.size() && !visible_emission[k].empty();
+        light += weighted ? visible_emission[k][i] * cosine : emissions[k] * (cosine * visibility[k][i]);
       }
       color[i] = gbuffer.albedo[i] * light;
     }

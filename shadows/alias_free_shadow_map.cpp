@@ -5,6 +5,7 @@
 
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
+#include "shadows/closed_components.h"
 #include "shadows/influence_region.h"
 #include "shadows/irregular_zbuffer.h"
 #include "shadows/solver.h"
@@ -14,7 +15,7 @@ namespace halfshade {
 namespace {
 
 constexpr std::size_t kTrianglesPerPart = 256;
-constexpr std::size_t kPartsPerRound = 32;  // bounds the memory of the spans
+constexpr std::size_t kPartsPerRound = 16;  // bounds the memory of the spans
 constexpr std::size_t kRowBlocks = 64;      // pieces of the grid, each written by one task
 
 /// Rows of the grid that one task owns: receivers list_begin..list_end of the sorted order.
@@ -54,38 +55,6 @@ ViewLists make_lists(LightViewCells&& cells) {
   lists.view = std::move(cells.view);
   make_blocks(lists);
   return lists;
-}
-
-/// Receivers as the kernel reads them, in list order.
-KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order,
-                                 std::size_t words) {
-  KernelReceivers k;
-  k.count = order.size();
-  k.words = words;
-  const std::size_t padded = order.size() + KernelReceivers::kLanePadding;
-  k.x.assign(padded, 0.0f), k.y.assign(padded, 0.0f), k.z.assign(padded, 0.0f);
-  k.own.assign(padded, kNone), k.open.assign(padded, ~0u);
-  k.set.assign(padded, 0);
-  k.masks.assign(order.size() * words, 0);
-  parallel_ranges(order.size(), 8192, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) {
-      const vec3& p = receivers.position[order[i]];
-      k.x[i] = p.x, k.y[i] = p.y, k.z[i] = p.z;
-      k.own[i] = receivers.triangle[order[i]];
-      k.set[i] = receivers.set[order[i]];
-    }
-  });
-  return k;
-}
-
-void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const std::vector<std::uint32_t>& order,
-                   VisibilityMasks& masks) {
-  parallel_ranges(order.size(), 8192, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) {
-      restore_sample_order(samples, {k.masks.data() + i * k.words, k.words},
-                           {masks.words.data() + order[i] * k.words, k.words});
-    }
-  });
 }
 
 /// Spans of one part of the triangles, by row block; `everywhere` counts triangles without a bounded region.
@@ -193,11 +162,7 @@ void solve_view(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
   }
   stats.bytes += view_positions.size() * sizeof(dvec3) + kernel.x.size() * 21 + kernel.masks.size() * 8 +
                  (lists.zbuffer.offsets.size() + lists.zbuffer.entries.size()) * 4;
-  stats.pairs_tested += total.pairs_tested;
-  stats.pairs_sampled += total.pairs_sampled;
-  stats.pairs_necessary += total.pairs_necessary;
-  stats.sample_tests += total.sample_tests;
-  stats.exact_fallbacks += total.exact_fallbacks;
+  add_to_stats(total, stats);
   stats.test_ms += watch.lap();
 }
 
@@ -213,7 +178,10 @@ void solve_alias_free_shadow_map(const LatticeMesh& mesh, const ReceiverArray& r
   Stopwatch watch;
   masks.reset(receivers.size(), samples.count);
   const LightBound bound = make_light_bound(light, samples);
-  const KernelSamples kernel_samples = make_kernel_samples(samples, bound);
+  KernelSamples kernel_samples = make_kernel_samples(samples, bound);
+  ClosedComponents closed;
+  certify(mesh, config, closed, kernel_samples, stats);
+  stats.build_ms += watch.lap();
   std::vector<LightViewCells> views = make_light_views(bound, samples, receivers, config.grid_resolution);
   stats.index_ms += watch.lap();
   for (std::size_t i = 0; i < views.size(); ++i) {

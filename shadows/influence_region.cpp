@@ -44,7 +44,7 @@ bool near_part_matters(const LightView& view, const std::array<dvec3, 3>& corner
   if (high.z < -reach * (1.0 + kPad) - 1e-12) return false;
   dvec3 light_low(HUGE_VAL), light_high(-HUGE_VAL);
   for (const dvec3& l : view.light_points) light_low = glm::min(light_low, l), light_high = glm::max(light_high, l);
-  if (view.sphere_radius > 0.0) light_low = dvec3(-view.sphere_radius), light_high = dvec3(view.sphere_radius);
+  if (view.ball.radius > 0.0) light_high = view.ball.reach() * (1.0 + kPad), light_low = -light_high;
   const double share = std::min(1.0, (depth + reach) / (view.near_z - reach));  // of the way from light to receiver
   for (int k = 0; k < 2; ++k) {
     const double to_low = std::max((view.receiver_low[k] - light_high[k]) * share, view.slope_low[k] * (depth + reach));
@@ -64,9 +64,11 @@ dvec2 far_image(const LightView& view, const dvec3& v, const dvec3& l) {
 }
 
 /// Hexagon around the circle that a spherical light shows to v: the silhouette lies in a plane across the line to v.
-void add_sphere_images(const LightView& view, const dvec3& v, std::vector<dvec2>& points) {
-  const double radius = view.sphere_radius, distance = glm::length(v);
-  const dvec3 w = v / distance;
+/// For an ellipsoid this happens in the space where it is a ball; lines through v stay lines on the way there and back.
+void add_ball_images(const LightView& view, const dvec3& v, std::vector<dvec2>& points) {
+  const dvec3 toward = view.ball.to_ball * v;
+  const double radius = view.ball.radius, distance = glm::length(toward);
+  const dvec3 w = toward / distance;
   const dvec3 a = glm::normalize(std::fabs(w.x) < 0.6 ? dvec3(0, w.z, -w.y) : dvec3(-w.z, 0, w.x)),
               b = glm::cross(w, a);
   const double ring = radius * std::sqrt(std::max(0.0, 1.0 - radius * radius / (distance * distance)));
@@ -75,7 +77,9 @@ void add_sphere_images(const LightView& view, const dvec3& v, std::vector<dvec2>
   constexpr double kHalf = 0.5, kHigh = 0.8660254037844387;
   const std::array<dvec2, 6> hexagon = {dvec2(1, 0),  dvec2(kHalf, kHigh),   dvec2(-kHalf, kHigh),
                                         dvec2(-1, 0), dvec2(-kHalf, -kHigh), dvec2(kHalf, -kHigh)};
-  for (const dvec2& h : hexagon) points.push_back(far_image(view, v, middle + (a * h.x + b * h.y) * reach));
+  for (const dvec2& h : hexagon) {
+    points.push_back(far_image(view, v, view.ball.from_ball * (middle + (a * h.x + b * h.y) * reach)));
+  }
 }
 
 /// A flat light's samples lie within light_depth of its plane, not in it: how far that can move an image.
@@ -94,7 +98,7 @@ double collect_points(const LightView& view, const Polygon& polygon, std::vector
     const dvec3& v = polygon.corner[i];
     points.push_back(dvec2(v) / v.z);
     if (v.z >= view.far_z) continue;  // beyond every receiver: only its own image bounds the part in front
-    if (view.sphere_radius > 0.0) add_sphere_images(view, v, points);
+    if (view.ball.radius > 0.0) add_ball_images(view, v, points);
     for (const dvec3& l : view.light_points) points.push_back(far_image(view, v, l));
     if (view.flat) pad = std::max(pad, thickness_pad(view, v));
   }

@@ -2,39 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "rasterizer/core/hash.h"
 #include "rasterizer/core/unit_circle.h"
+#include "shadows/polygon_light.h"
+#include "shadows/sample_patterns.h"
 
 namespace halfshade {
 namespace {
-
-/// Rows of the cell grid: the exact grid with rows <= columns <= 2 rows where the count has one, else
-/// floor(sqrt(count)) rows whose numbers of columns differ by at most one; each sample stands for the same area either
-/// way.
-std::uint32_t row_count(std::uint32_t count) {
-  auto root = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(count)));
-  while (root * root > count) --root;
-  for (std::uint32_t rows = root; rows >= 1 && count <= 2 * rows * rows; --rows) {
-    if (count % rows == 0) return rows;
-  }
-  return root;
-}
-
-double fraction(double x) { return x - std::floor(x); }
-
-/// Shift of row `row` as a fraction of a column: a rank-1 lattice whose generator is coprime to the number of rows and
-/// near the golden section of it, so that neighbouring rows are spread well.
-double row_shift(std::uint32_t row, std::uint32_t rows) {
-  auto gcd = [](std::uint32_t a, std::uint32_t b) {
-    while (b != 0) a = std::exchange(b, a % b);
-    return a;
-  };
-  auto generator = static_cast<std::uint32_t>(rows * 0.6180339887498949 + 0.5);
-  while (generator > 1 && gcd(generator, rows) != 1) --generator;
-  return (static_cast<double>((std::uint64_t{row} * generator) % rows) + 0.5) / rows;
-}
 
 void make_orthonormal(const dvec3& normal, LightSamples& samples) {
   samples.axis_n = glm::normalize(normal);
@@ -72,10 +46,16 @@ void check(const Light& light, const ShadowConfig& config) {
   if (config.sample_sets < 1 || config.sample_sets > 256) {
     throw Error(ErrorCode::kUsage, "sample sets: " + std::to_string(config.sample_sets) + " is not in 1..256");
   }
+  if (config.frame >= kMaxFrames) {
+    throw Error(ErrorCode::kUsage,
+                "frame: " + std::to_string(config.frame) + " is not below " + std::to_string(kMaxFrames));
+  }
   require(
       finite(light.center) && finite(light.u) && finite(light.v) && finite(light.normal) && std::isfinite(light.radius),
       light, "a coordinate is not finite");
   require(light.radius >= 0.0, light, "the radius is negative");
+  require(std::all_of(light.axes.begin(), light.axes.end(), finite), light, "a coordinate is not finite");
+  require(light.shape != LightShape::kDisk || glm::length(light.normal) > 0.0, light, "the normal is zero");
   if (light.shape == LightShape::kSamples) {
     require(!light.points.empty(), light, "there are no sample points");
     if (light.points.size() > 4096) {
@@ -86,41 +66,72 @@ void check(const Light& light, const ShadowConfig& config) {
   }
 }
 
-/// Frame of the light: centre, axes, flatness. A rectangle without area (a segment or a point) is not flat: it has no
-/// facing, and the general, volumetric treatment covers it.
-void describe(const Light& light, const LocalFrame& frame, LightSamples& samples) {
-  samples.center = frame.to_local(light.center);
-  if (light.shape == LightShape::kRectangle) {
-    const dvec3 normal = glm::cross(light.u, light.v);
-    const double length = glm::length(normal);
-    samples.flat = length > 1e-9 * glm::length(light.u) * glm::length(light.v) && length > 0.0;
-    if (samples.flat) {
-      samples.axis_n = normal / length;
-      samples.axis_u = glm::normalize(light.u);
-      samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
-    }
-  } else if (light.shape == LightShape::kDisk) {
-    require(glm::length(light.normal) > 0.0, light, "the normal is zero");
-    samples.flat = light.radius > 0.0;
-    make_orthonormal(light.normal, samples);
-  } else if (light.shape == LightShape::kSamples) {
-    dvec3 low = light.points[0], high = low;
-    for (const dvec3& p : light.points) low = glm::min(low, p), high = glm::max(high, p);
-    samples.center = (frame.to_local(low) + frame.to_local(high)) * 0.5;
-  }
-  samples.one_sided = samples.flat && !light.two_sided;
+/// Gram and Schmidt; the axes stay those of the frame where the ellipsoid has no two independent ones.
+void describe_ellipsoid(const Light& light, LightSamples& samples) {
+  const auto& [a, b, c] = light.axes;
+  const dvec3 n = glm::cross(a, b);
+  if (!(glm::length(n) > 1e-9 * glm::length(a) * glm::length(b))) return;
+  samples.axis_u = glm::normalize(a);
+  samples.axis_n = glm::normalize(n);
+  samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
 }
 
-dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2& st) {
+/// A rectangle without area (a segment or a point) is not flat: it has no facing, and the general, volumetric treatment
+/// covers it.
+void describe_rectangle(const Light& light, LightSamples& samples) {
+  const dvec3 normal = glm::cross(light.u, light.v);
+  const double length = glm::length(normal);
+  samples.flat = length > 1e-9 * glm::length(light.u) * glm::length(light.v) && length > 0.0;
+  if (!samples.flat) return;
+  samples.axis_n = normal / length;
+  samples.axis_u = glm::normalize(light.u);
+  samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
+}
+
+void describe_polygon(const PolygonLight& polygon, const LocalFrame& frame, LightSamples& samples) {
+  samples.center = frame.to_local(polygon.center);
+  samples.flat = true;
+  samples.axis_u = polygon.axis_u, samples.axis_v = polygon.axis_v, samples.axis_n = polygon.axis_n;
+  for (const dvec2& corner : polygon.corners) samples.outline.push_back(corner * frame.scale);
+}
+
+void describe_points(const Light& light, const LocalFrame& frame, LightSamples& samples) {
+  dvec3 low = light.points[0], high = low;
+  for (const dvec3& p : light.points) low = glm::min(low, p), high = glm::max(high, p);
+  samples.center = (frame.to_local(low) + frame.to_local(high)) * 0.5;
+  samples.count = static_cast<std::uint32_t>(light.points.size());
+  for (const dvec3& p : light.points) samples.points.push_back(frame.to_lattice(p));
+}
+
+/// Rotation by `turns` around the unit vector `axis` (Rodrigues).
+dvec3 rotated(const dvec3& p, const dvec3& axis, double turns) {
+  const dvec2 angle = unit_circle(turns);
+  return p * angle.x + glm::cross(axis, p) * angle.y + axis * (glm::dot(axis, p) * (1.0 - angle.x));
+}
+
+/// Turn of set `set` in units of a whole turn: the golden section spreads any number of sets evenly.
+double turn_of_set(std::uint32_t set) {
+  const double x = set * 0.6180339887498949;
+  return x - std::floor(x);
+}
+
+/// Offset from the light's centre, world units; `set` counts only where sets are rotated copies.
+dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2& st, std::uint32_t set) {
   switch (light.shape) {
     case LightShape::kRectangle:
       return light.u * (st.x - 0.5) + light.v * (st.y - 0.5);
     case LightShape::kDisk: {
       const dvec2 p = light.radius * concentric_disk(st);
-      return samples.axis_u * p.x + samples.axis_v * p.y;
+      return rotated(samples.axis_u * p.x + samples.axis_v * p.y, samples.axis_n, turn_of_set(set));
     }
-    case LightShape::kSphere:
-      return light.radius * sphere_point(st);
+    case LightShape::kSphere: {
+      const dvec3 axis = sphere_point({turn_of_set(3 * set + 1), turn_of_set(2 * set + 1)});
+      return light.radius * rotated(sphere_point(st), axis, turn_of_set(set));
+    }
+    case LightShape::kEllipsoid: {
+      const dvec3 p = sphere_point(st);
+      return light.axes[0] * p.x + light.axes[1] * p.y + light.axes[2] * p.z;
+    }
     default:
       return dvec3(0.0);
   }
@@ -128,43 +139,44 @@ dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2
 
 }  // namespace
 
-dvec2 unit_square_sample(SamplePattern pattern, std::uint32_t index, std::uint32_t count, std::uint32_t set,
-                         std::uint32_t seed) {
-  const std::uint32_t rows = row_count(count);
-  const std::uint32_t row = static_cast<std::uint32_t>((std::uint64_t{index} * rows + rows - 1) / count);
-  const std::uint32_t first = static_cast<std::uint32_t>(std::uint64_t{row} * count / rows);
-  const std::uint32_t columns = static_cast<std::uint32_t>(std::uint64_t{row + 1} * count / rows) - first;
-  double s = 0.5, t = 0.5;
-  if (pattern == SamplePattern::kStratified) {
-    s = hash_unit(index, hash32(seed, 2 * set));
-    t = hash_unit(index, hash32(seed, 2 * set + 1));
-  } else {
-    if (pattern == SamplePattern::kRows) s = row_shift(row, rows);
-    s = fraction(s + set * 0.7548776662466927);  // R2 sequence (Roberts 2018): sets differ by spread-out offsets
-    t = fraction(t + set * 0.5698402909980532);
-  }
-  return {(index - first + s) / columns, (first + t * columns) / count};
+std::uint32_t number_of_sets(const Light& light, const ShadowConfig& config) {
+  if (light.shape == LightShape::kPoint || light.shape == LightShape::kSamples) return 1;
+  return config.interleave ? kInterleavedSets : config.sample_sets;
 }
 
 LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame) {
   check(light, config);
   LightSamples samples;
-  describe(light, frame, samples);
+  samples.center = frame.to_local(light.center);
+  samples.sets = number_of_sets(light, config);
+  samples.interleaved = samples.sets == kInterleavedSets && config.interleave;
+  PolygonLight polygon;
+  if (light.shape == LightShape::kRectangle) describe_rectangle(light, samples);
+  if (light.shape == LightShape::kDisk) {
+    samples.flat = light.radius > 0.0;
+    make_orthonormal(light.normal, samples);
+  }
+  if (light.shape == LightShape::kEllipsoid) describe_ellipsoid(light, samples);
+  if (light.shape == LightShape::kPolygon) {
+    polygon = make_polygon_light(light);
+    describe_polygon(polygon, frame, samples);
+  }
+  samples.one_sided = samples.flat && !light.two_sided;
   if (light.shape == LightShape::kSamples) {
-    samples.count = static_cast<std::uint32_t>(light.points.size());
-    for (const dvec3& p : light.points) samples.points.push_back(frame.to_lattice(p));
+    describe_points(light, frame, samples);
     return samples;
   }
-  const bool point = light.shape == LightShape::kPoint;
-  samples.count = point ? 1 : config.light_sample_count;
-  samples.sets = point ? 1 : config.sample_sets;
-  samples.points.reserve(std::size_t{samples.count} * samples.sets);
-  for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    for (std::uint32_t i = 0; i < samples.count; ++i) {
-      const dvec2 st = unit_square_sample(config.pattern, i, samples.count, set, config.seed);
-      const dvec3 offset = frame.to_local_vector(sample_offset(light, samples, st));
-      samples.points.push_back(snap_to_lattice(samples.center + offset));
-    }
+  samples.count = light.shape == LightShape::kPoint ? 1 : config.light_sample_count;
+  const bool rotate = config.rotate_sets && (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere);
+  const std::vector<dvec2> first =
+      unit_square_samples(config.pattern, samples.count, config.frame, rotate ? 1 : samples.sets, config.seed);
+  for (std::size_t i = 0; i < std::size_t{samples.sets} * samples.count; ++i) {
+    const dvec2 st = first[rotate ? i % samples.count : i];
+    const auto turn = rotate ? config.frame + static_cast<std::uint32_t>(i / samples.count) : 0;
+    const dvec3 offset =
+        light.shape == LightShape::kPolygon ? polygon.offset(st) : sample_offset(light, samples, st, turn);
+    samples.st.push_back(st);
+    samples.points.push_back(snap_to_lattice(samples.center + frame.to_local_vector(offset)));
   }
   return samples;
 }
@@ -178,7 +190,13 @@ std::vector<dvec3> light_extent(const Light& light) {
       return {light.center + a, light.center - a, light.center + b, light.center - b};
     }
     case LightShape::kSamples:
+    case LightShape::kPolygon:
       return light.points;
+    case LightShape::kEllipsoid: {
+      const auto& [a, b, c] = light.axes;  // the box around |p| = 1: the norm of each coordinate's row
+      const dvec3 reach = glm::sqrt(a * a + b * b + c * c);
+      return {light.center + reach, light.center - reach};
+    }
     default:
       return {light.center + dvec3(light.radius), light.center - dvec3(light.radius)};
   }

@@ -1,4 +1,4 @@
-// Where the samples of an area light lie: a pure function of (light, pattern, count, sets, seed).
+// Where the samples of an area light lie: a pure function of (light, pattern, count, sets, seed, frame).
 #pragma once
 
 #include "halfshade/shadows.h"
@@ -6,14 +6,23 @@
 
 namespace halfshade {
 
+/// ShadowConfig::frame stays below this: the offsets of the sets, multiples of an irrational number modulo 1, then keep
+/// 28 bits behind the point.
+inline constexpr std::uint32_t kMaxFrames = 1u << 25;
+
+inline constexpr std::uint32_t kInterleavedSets = 16;
+
 /// Samples of one light on the lattice of a local frame.
 struct LightSamples {
   std::uint32_t count = 0, sets = 1;
+  bool interleaved = false;  // sets are chosen by place in a 4x4 pattern of pixels, not by hash
   std::vector<vec3> points;  // [set][sample]
+  std::vector<dvec2> st;     // [set][sample] in [0,1)^2, what the pattern gave; empty for explicit samples
   dvec3 center{0.0};         // local frame
   bool flat = false;         // all samples lie (up to rounding) in one plane through `center`
   bool one_sided = false;    // flat, and receivers at or behind the plane get no light
   dvec3 axis_u{1, 0, 0}, axis_v{0, 1, 0}, axis_n{0, 0, 1};  // orthonormal; flat lights: u, v in the plane, n = facing
+  std::vector<dvec2> outline;  // polygons: corners around `center`, counter-clockwise, in units of axis_u, axis_v
 
   std::span<const vec3> set(std::uint32_t index) const { return {points.data() + std::size_t{index} * count, count}; }
 };
@@ -21,11 +30,10 @@ struct LightSamples {
 /// Throws Error{kUsage} for counts out of range, Error{kBadInput} for a degenerate light (message names the light).
 LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame);
 
+/// Weights of the samples of every set, [set][sample] (halfshade/emission.h).
+std::vector<vec3> sample_emission(const EmissionImage& image, const LightSamples& samples);
+
 /// World-space points that the local frame must reach: corners or bounding box of the light.
 std::vector<dvec3> light_extent(const Light& light);
-
-/// (s, t) in [0,1)^2 of sample `index` of `count`, set `set`; rows by increasing t.
-dvec2 unit_square_sample(SamplePattern pattern, std::uint32_t index, std::uint32_t count, std::uint32_t set,
-                         std::uint32_t seed);
 
 }  // namespace halfshade

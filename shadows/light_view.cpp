@@ -36,6 +36,37 @@ std::vector<dvec2> polygon_around(const std::vector<dvec2>& points, int corners)
   return polygon;
 }
 
+/// `outline` (around its own origin, which lies inside) scaled so that it holds all points, relative to `origin`.
+std::vector<dvec2> polygon_scaled_around(const std::vector<dvec2>& points, const std::vector<dvec2>& outline,
+                                         const dvec2& origin) {
+  double scale = 1.0;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const dvec2 edge = outline[(i + 1) % outline.size()] - outline[i], normal(edge.y, -edge.x);
+    const double support = glm::dot(outline[i], normal);
+    if (!(support > 0.0)) continue;  // corners that coincide
+    for (const dvec2& p : points) scale = std::max(scale, glm::dot(p + origin, normal) / support);
+  }
+  std::vector<dvec2> polygon;
+  for (const dvec2& corner : outline) polygon.push_back(corner * (scale * kWiden) - origin);
+  return polygon;
+}
+
+/// The ellipsoid's own shape, as large as its samples need; no ball for an ellipsoid that is flat, or nearly so.
+BallBound make_ball(const Light& light, const LightSamples& samples, const dvec3& center) {
+  BallBound ball;
+  if (light.shape == LightShape::kEllipsoid) {
+    double size = 0.0;
+    for (const dvec3& axis : light.axes) size = std::max(size, glm::length(axis));
+    ball.from_ball = glm::dmat3(light.axes[0] / size, light.axes[1] / size, light.axes[2] / size);
+    if (!(std::fabs(glm::determinant(ball.from_ball)) > 1e-6)) return {};
+    ball.to_ball = glm::inverse(ball.from_ball);
+  }
+  for (const vec3& l : samples.points) {
+    ball.radius = std::max(ball.radius, glm::length(ball.to_ball * (dvec3(l) - center)) * kWiden);
+  }
+  return ball;
+}
+
 LightView make_view(const LightBound& bound, const dvec3& x, const dvec3& y, const dvec3& z) {
   LightView view;
   view.origin = dvec3(bound.center);
@@ -72,10 +103,11 @@ std::size_t view_of(const std::vector<LightView>& views, const dvec3& p) {
 }
 
 void set_light(const LightBound& bound, const LightSamples& samples, LightView& view) {
-  view.sphere_radius = bound.sphere_radius;
   view.flat = bound.flat;
-  if (bound.sphere_radius > 0.0) {
-    view.light_depth = 1.2 * bound.sphere_radius;  // a hexagon around the silhouette reaches 1.155 radii
+  if (bound.ball.radius > 0.0) {
+    const glm::dmat3 from_view(view.x, view.y, view.z);
+    view.ball = {bound.ball.radius, glm::transpose(from_view) * bound.ball.from_ball, bound.ball.to_ball * from_view};
+    view.light_depth = 1.2 * view.ball.reach().z;  // a hexagon around the silhouette reaches 1.155 radii
   } else if (bound.flat) {
     for (const dvec2& p : bound.outline) {
       const dvec3 q = view.to_view(view.origin + samples.axis_u * p.x + samples.axis_v * p.y);
@@ -129,6 +161,11 @@ std::uint32_t choose_resolution(std::size_t receivers) {
 
 }  // namespace
 
+dvec3 BallBound::reach() const {
+  const glm::dmat3 rows = glm::transpose(from_ball);
+  return radius * dvec3(glm::length(rows[0]), glm::length(rows[1]), glm::length(rows[2]));
+}
+
 double LightGrid::row_border(std::uint32_t row) const {
   if (cells_per_unit.y == 0.0) return row == 0 ? -HUGE_VAL : HUGE_VAL;
   const double w = low.y + row / cells_per_unit.y;
@@ -154,11 +191,18 @@ LightBound make_light_bound(const Light& light, const LightSamples& samples) {
     const dvec3 q(glm::dot(d, axes[0]), glm::dot(d, axes[1]), glm::dot(d, axes[2]));
     reach = glm::max(reach, glm::abs(q));
     in_plane.emplace_back(q);
-    if (light.shape == LightShape::kSphere)
-      bound.sphere_radius = std::max(bound.sphere_radius, glm::length(d) * kWiden);
+  }
+  if (light.shape == LightShape::kSphere || light.shape == LightShape::kEllipsoid) {
+    bound.ball = make_ball(light, samples, dvec3(bound.center));
   }
   for (int k = 0; k < 3; ++k) bound.half_axes[k] = axes[k] * (reach[k] * kWiden);
-  if (bound.flat) bound.outline = polygon_around(in_plane, light.shape == LightShape::kRectangle ? 4 : 8);
+  if (bound.flat && light.shape == LightShape::kPolygon) {
+    const dvec3 shift = dvec3(bound.center) - samples.center;
+    bound.outline =
+        polygon_scaled_around(in_plane, samples.outline, {glm::dot(shift, axes[0]), glm::dot(shift, axes[1])});
+  } else if (bound.flat) {
+    bound.outline = polygon_around(in_plane, light.shape == LightShape::kRectangle ? 4 : 8);
+  }
   return bound;
 }
 

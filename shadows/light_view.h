@@ -9,16 +9,27 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/mat3x3.hpp>
+
 #include "shadows/receivers.h"
 
 namespace halfshade {
 
-/// Convex bound of all samples of a light: a parallelepiped and, for spherical lights, a sphere.
+/// A ball and the linear map that makes an ellipsoid of it (section 4.1: "a virtual scaling of the entire scene").
+struct BallBound {
+  double radius = 0.0;                      // 0: there is none
+  glm::dmat3 from_ball{1.0}, to_ball{1.0};  // inverse of each other; identity for spheres
+
+  /// Half extents of the box around the ellipsoid.
+  dvec3 reach() const;
+};
+
+/// Convex bound of all samples of a light: a parallelepiped and, for spheres and ellipsoids, a ball.
 struct LightBound {
   vec3 center{0.0f};               // on the lattice
   std::array<dvec3, 3> half_axes;  // orthogonal; the third is the (tiny) thickness of a flat light
   bool flat = false;
-  double sphere_radius = 0.0;  // > 0: all samples lie within this distance of the centre, use it as the bound
+  BallBound ball;              // around the centre, axes of the local frame
   std::vector<dvec2> outline;  // flat lights: convex polygon around the samples, in units of axis_u, axis_v
 };
 
@@ -45,7 +56,7 @@ struct LightGrid {
 struct LightView {
   dvec3 origin{0.0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};  // local frame; orthonormal, looking along +z
   std::vector<dvec3> light_points;                        // vertices of the light's bound in view coordinates
-  double sphere_radius = 0.0;                             // > 0: the bound is this sphere instead
+  BallBound ball;                                         // in view coordinates: if there is one, it is the bound
   bool flat = false;                 // light_points lie in z = 0; the samples within light_depth of it
   double light_depth = 0.0;          // max |z| of the light's bound
   double near_z = 0.0, far_z = 0.0;  // receivers on the grid have near_z <= z <= far_z

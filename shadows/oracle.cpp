@@ -29,6 +29,14 @@ void block_samples(const LatticeMesh& mesh, std::uint32_t triangle, const vec3& 
   }
 }
 
+/// Receivers between two reports of progress: as many as take about a tenth of a second, so that stopping is prompt,
+/// but enough to keep all threads busy. Most tests are rejected early, in about a nanosecond.
+std::size_t receivers_per_round(std::size_t tests_per_receiver) {
+  constexpr std::size_t kTestsPerThread = 100'000'000;
+  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  return threads * std::clamp<std::size_t>(kTestsPerThread / std::max<std::size_t>(1, tests_per_receiver), 2, 1024);
+}
+
 }  // namespace
 
 void oracle_mask(const LatticeMesh& mesh, const ReceiverArray& receivers, std::size_t receiver,
@@ -48,11 +56,11 @@ void oracle_mask(const LatticeMesh& mesh, const ReceiverArray& receivers, std::s
 
 void solve_oracle(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
                   const ShadowConfig& config, VisibilityMasks& masks) {
-  constexpr std::size_t kRound = 2048;  // receivers between two reports of progress
+  const std::size_t round = receivers_per_round(mesh.triangles.size() * samples.count);
   masks.reset(receivers.size(), samples.count);
-  for (std::size_t first = 0; first < receivers.size(); first += kRound) {
+  for (std::size_t first = 0; first < receivers.size(); first += round) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(receivers.size()));
-    parallel_ranges(std::min(kRound, receivers.size() - first), 16, [&](std::size_t begin, std::size_t end) {
+    parallel_ranges(std::min(round, receivers.size() - first), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = first + begin; i != first + end; ++i) {
         oracle_mask(mesh, receivers, i, samples,
                     {masks.words.data() + i * masks.words_per_receiver, masks.words_per_receiver});

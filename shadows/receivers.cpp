@@ -6,11 +6,12 @@
 namespace halfshade {
 namespace {
 
-/// Position in the whole picture, so that a crop gives every pixel the same samples as the full render.
-std::uint32_t picture_index(const GBuffer& gbuffer, std::uint32_t entry) {
+/// By place in the whole picture, so that a crop gives every pixel the same samples as the full render.
+std::uint32_t set_of_entry(const GBuffer& gbuffer, const LightSamples& samples, std::uint32_t seed,
+                           std::uint32_t entry) {
   const std::uint32_t x = gbuffer.window.x0 + entry % gbuffer.window.width();
   const std::uint32_t y = gbuffer.window.y0 + entry / gbuffer.window.width();
-  return y * gbuffer.width + x;
+  return samples.interleaved ? interleaved_set(x, y) : receiver_set(y * gbuffer.width + x, seed, samples.sets);
 }
 
 ReceiverArray receivers_of_range(const GBuffer& gbuffer, const LightSamples& samples, std::uint32_t seed,
@@ -21,7 +22,7 @@ ReceiverArray receivers_of_range(const GBuffer& gbuffer, const LightSamples& sam
     const auto entry = static_cast<std::uint32_t>(i);
     const vec3 normal = gbuffer.geometric_normal[i];
     const vec3 position = snap_to_lattice(gbuffer.position[i] + dvec3(normal) * kReceiverOffset);
-    const std::uint32_t set = receiver_set(picture_index(gbuffer, entry), seed, samples.sets);
+    const std::uint32_t set = set_of_entry(gbuffer, samples, seed, entry);
     if (faces_away(position, normal, samples, set)) continue;
     part.push_back(position, normal, gbuffer.triangle[i], entry, static_cast<std::uint8_t>(set));
   }

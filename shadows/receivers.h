@@ -27,7 +27,10 @@ inline constexpr double kReceiverOffset = 0x1p-21;
 /// receiver's tangent plane, or the receiver lies at or behind a one-sided light. A pure function of rounded inputs.
 bool faces_away(const vec3& position, const vec3& normal, const LightSamples& samples, std::uint32_t set);
 
-/// Set of light samples that the receiver at pixel sample `index` of the whole picture uses.
+/// Set of light samples that the receiver at pixel sample (x, y) of the whole picture uses with interleaved sets.
+inline std::uint32_t interleaved_set(std::uint32_t x, std::uint32_t y) { return y % 4 * 4 + x % 4; }
+
+/// The same with sets chosen by hash; `index` numbers the pixel samples of the whole picture.
 std::uint32_t receiver_set(std::uint32_t index, std::uint32_t seed, std::uint32_t sets);
 
 /// Receivers of all visible samples that do not face away from the light, in picture order.

@@ -3,6 +3,7 @@
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/alias_free_shadow_map.h"
+#include "shadows/exact_engine.h"
 #include "shadows/oracle.h"
 
 namespace halfshade {
@@ -14,10 +15,11 @@ struct Named {
   const char* name;
 };
 
-constexpr Named<ShadowMethod> kMethods[] = {{ShadowMethod::kAliasFreeShadowMap, "afsm"},
-                                            {ShadowMethod::kOracle, "oracle"}};
+constexpr Named<ShadowMethod> kMethods[] = {
+    {ShadowMethod::kAliasFreeShadowMap, "afsm"}, {ShadowMethod::kExact, "exact"}, {ShadowMethod::kOracle, "oracle"}};
 constexpr Named<SamplePattern> kPatterns[] = {
-    {SamplePattern::kRows, "rows"}, {SamplePattern::kUniform, "uniform"}, {SamplePattern::kStratified, "stratified"}};
+    {SamplePattern::kRows, "rows"}, {SamplePattern::kUniform, "uniform"}, {SamplePattern::kStratified, "stratified"},
+    {SamplePattern::kLowDiscrepancy, "low-discrepancy"}, {SamplePattern::kPoissonDisk, "poisson-disk"}};
 
 template <class Value, std::size_t n>
 Value value_of(const Named<Value> (&table)[n], const std::string& name, const char* what) {
@@ -67,6 +69,9 @@ void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
     case ShadowMethod::kAliasFreeShadowMap:
       solve_alias_free_shadow_map(mesh, receivers, light, samples, config, masks, stats);
       break;
+    case ShadowMethod::kExact:
+      solve_exact(mesh, receivers, light, samples, config, masks, stats);
+      break;
     case ShadowMethod::kOracle: {
       Stopwatch watch;
       solve_oracle(mesh, receivers, samples, config, masks);
@@ -93,8 +98,9 @@ void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, cons
     if (behind) {
       unlit.push_back(i);
     } else {
-      array.push_back(position, vec3(0.0f), receivers[i].triangle, i,
-                      static_cast<std::uint8_t>(receiver_set(i, config.seed, samples.sets)));
+      const std::uint32_t set =
+          samples.interleaved ? i % kInterleavedSets : receiver_set(i, config.seed, samples.sets);
+      array.push_back(position, vec3(0.0f), receivers[i].triangle, i, static_cast<std::uint8_t>(set));
     }
   }
   ShadowStats own;

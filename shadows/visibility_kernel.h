@@ -14,6 +14,7 @@
 namespace halfshade {
 
 struct LightBound;
+struct ClosedComponents;
 
 /// Light samples as the kernel reads them: offsets from the light's centre in an order that puts neighbours together,
 /// in groups of 16 with a bounding box each. Bit i of a mask under construction is the i-th sample of this order.
@@ -25,13 +26,16 @@ struct KernelSamples {
   vec3 center{0.0f};                             // on the lattice
   float reach = 0.0f;                            // max |coordinate| of an offset
   std::array<vec3, 3> half_axes{};               // parallelepiped around all offsets
-  std::vector<std::uint32_t> order;              // [padded] -> sample index; the padding repeats the last sample
+  std::vector<std::uint32_t> order;              // [set][padded] -> sample index; the padding repeats the last sample
   std::vector<float> x, y, z;                    // [set][padded] offsets
   std::vector<vec3> points;                      // [set][padded] positions on the lattice
   std::uint32_t group_stride = 0;                // groups per set, rounded up to a multiple of 64
   std::vector<float> group_x, group_y, group_z;  // [set][group_stride] centres of the groups' boxes
   std::vector<float> half_x, half_y, half_z;     // [set][group_stride] half extents, rounded up
   std::vector<std::uint64_t> valid;              // [padded / 64]: bits of real samples
+
+  const ClosedComponents* closed = nullptr;  // certificate for back-face-only casters; null = both sides cast
+  std::vector<std::uint8_t> closed_usable;   // [closed component] all samples lie outside its box
 
   std::span<const vec3> set_points(std::uint32_t set) const {
     return {points.data() + std::size_t{set} * padded, padded};
@@ -40,8 +44,11 @@ struct KernelSamples {
 
 KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound);
 
-/// Mask bits from the kernel's order of samples to sample indices.
-void restore_sample_order(const KernelSamples& samples, std::span<const std::uint64_t> kernel_mask,
+/// Lets front faces of closed components be skipped where that is certified to change no bit.
+void use_certificate(const ClosedComponents& closed, KernelSamples& samples);
+
+/// Mask bits from the kernel's order of the set's samples to sample indices.
+void restore_sample_order(const KernelSamples& samples, std::uint32_t set, std::span<const std::uint64_t> kernel_mask,
                           std::span<std::uint64_t> mask);
 
 /// Receivers in the order of the lists, as parallel arrays with kLanePadding entries to spare at the end.
@@ -65,6 +72,17 @@ struct KernelCounters {
   std::uint64_t pairs_tested = 0, pairs_sampled = 0, pairs_necessary = 0, sample_tests = 0, exact_fallbacks = 0;
   void add(const KernelCounters& o);
 };
+
+void add_to_stats(const KernelCounters& counters, ShadowStats& stats);
+
+struct ReceiverArray;
+
+/// Receivers as the kernels read them, in the given order, nothing blocked yet.
+KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order,
+                                 std::size_t words);
+/// The finished masks back into the order of the receivers, with samples in their own order.
+void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const std::vector<std::uint32_t>& order,
+                   VisibilityMasks& masks);
 
 /// ORs into receivers.masks what the blockers hide. Spans must stay within receivers that no other call writes.
 void test_blockers(const LatticeMesh& mesh, const KernelSamples& samples, std::span<const BlockerSpan> spans,

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 
+#include <glm/vector_relational.hpp>
+
+#include "shadows/closed_components.h"
 #include "shadows/light_view.h"
 
 namespace halfshade {
@@ -59,11 +63,13 @@ KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound&
   kernel.padded = (samples.count + 63) / 64 * 64;
   kernel.sets = samples.sets;
   kernel.center = bound.center;
-  for (std::uint32_t i = 0; i < samples.count; ++i) kernel.order.push_back(i);
-  group_neighbours(samples.set(0), kernel.order);
-  kernel.order.resize(kernel.padded, kernel.order.back());
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    for (const std::uint32_t i : kernel.order) {
+    std::vector<std::uint32_t> order(samples.count);
+    std::iota(order.begin(), order.end(), 0u);
+    group_neighbours(samples.set(set), order);
+    order.resize(kernel.padded, order.back());
+    kernel.order.insert(kernel.order.end(), order.begin(), order.end());
+    for (const std::uint32_t i : order) {
       const vec3 point = samples.set(set)[i], offset = point - bound.center;
       kernel.points.push_back(point);
       kernel.x.push_back(offset.x), kernel.y.push_back(offset.y), kernel.z.push_back(offset.z);
@@ -77,7 +83,18 @@ KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound&
   return kernel;
 }
 
-void restore_sample_order(const KernelSamples& samples, std::span<const std::uint64_t> kernel_mask,
+void use_certificate(const ClosedComponents& closed, KernelSamples& samples) {
+  samples.closed = &closed;
+  vec3 low = samples.points[0], high = low;
+  for (const vec3& p : samples.points) low = glm::min(low, p), high = glm::max(high, p);
+  samples.closed_usable.clear();
+  for (const ClosedComponents::Box& box : closed.boxes) {
+    samples.closed_usable.push_back(glm::any(glm::lessThan(high, box.low)) ||
+                                    glm::any(glm::greaterThan(low, box.high)));
+  }
+}
+
+void restore_sample_order(const KernelSamples& samples, std::uint32_t set, std::span<const std::uint64_t> kernel_mask,
                           std::span<std::uint64_t> mask) {
   bool all = true, none = true;
   for (std::size_t w = 0; w < mask.size(); ++w) {
@@ -89,9 +106,10 @@ void restore_sample_order(const KernelSamples& samples, std::span<const std::uin
     return;
   }
   std::fill(mask.begin(), mask.end(), 0);
+  const std::uint32_t* order = samples.order.data() + std::size_t{set} * samples.padded;
   for (std::size_t w = 0; w < mask.size(); ++w) {
     for (std::uint64_t rest = kernel_mask[w]; rest != 0; rest &= rest - 1) {
-      const std::uint32_t index = samples.order[64 * w + static_cast<std::size_t>(std::countr_zero(rest))];
+      const std::uint32_t index = order[64 * w + static_cast<std::size_t>(std::countr_zero(rest))];
       mask[index / 64] |= std::uint64_t{1} << (index % 64);
     }
   }
@@ -116,8 +134,12 @@ Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std:
   b.samples_below = b.plane_at_center - reach <= 0.0f;
   b.all_above = !b.samples_below;
   b.all_below = !b.samples_above;
+  if (samples.closed != nullptr && samples.closed->of_triangle[triangle] != kNone) {
+    const std::uint32_t component = samples.closed->of_triangle[triangle];
+    b.back_faces_only = samples.closed_usable[component] != 0;
+    b.box_low = samples.closed->boxes[component].low, b.box_high = samples.closed->boxes[component].high;
+  }
   b.perforated = mesh.alpha_map(triangle) != kNone;
-  if (b.perforated) b.alpha = make_alpha_triangle(mesh, triangle);
   return b;
 }
 
@@ -130,7 +152,7 @@ std::uint64_t settle_samples(const Blocker& blocker, const vec3& receiver, std::
     if (blocks(a, b, c, receiver, samples[static_cast<std::size_t>(bit)])) inside |= std::uint64_t{1} << bit;
   }
   if (!blocker.perforated || inside == 0) return inside;
-  const AlphaLookup lookup(blocker.alpha, receiver);
+  const AlphaLookup lookup(*blocker.alpha, receiver);
   for (std::uint64_t rest = inside; rest != 0; rest &= rest - 1) {
     const int bit = std::countr_zero(rest);
     if (!lookup.opaque(samples[static_cast<std::size_t>(bit)], counters.exact_fallbacks))

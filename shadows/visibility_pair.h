@@ -23,8 +23,10 @@ struct Blocker {
   float plane_error = 0.0f;                         // error bound of normal . (sample - corner 0)
   bool samples_above = true, samples_below = true;  // some sample may lie on that side (along the normal) of the plane
   bool all_above = false, all_below = false;        // all samples certainly do
-  bool perforated = false;                          // alpha-tested: `alpha` is set
-  AlphaTriangle alpha;
+  bool back_faces_only = false;                     // for receivers outside the box: certified (closed_components.h)
+  vec3 box_low{0.0f}, box_high{0.0f};               // of the blocker's component, if back_faces_only
+  bool perforated = false;                          // alpha-tested
+  const AlphaTriangle* alpha = nullptr;             // set by the caller of make_blocker for perforated ones
 };
 
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle);

@@ -24,14 +24,6 @@ bool test_pair(const LatticeMesh& mesh, const KernelSamples& samples, std::uint3
 
 }  // namespace
 
-void KernelCounters::add(const KernelCounters& o) {
-  pairs_tested += o.pairs_tested;
-  pairs_sampled += o.pairs_sampled;
-  pairs_necessary += o.pairs_necessary;
-  sample_tests += o.sample_tests;
-  exact_fallbacks += o.exact_fallbacks;
-}
-
 void test_blockers_reference(const LatticeMesh& mesh, const KernelSamples& samples, std::span<const BlockerSpan> spans,
                              KernelReceivers& receivers, KernelCounters& counters) {
   for (const BlockerSpan& span : spans) {

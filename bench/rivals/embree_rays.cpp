@@ -85,6 +85,16 @@ void alpha_filter(const RTCFilterFunctionNArguments* args) {
   }
 }
 
+/// Packets whose rays start at `receiver(lane)`; only directions and tfar change from call to call.
+template <int width, class Receiver>
+void start_rays(typename Packet<width>::Ray& ray, const Receiver& receiver) {
+  for (std::size_t k = 0; k < width; ++k) {
+    const vec3 r = receiver(k);
+    ray.org_x[k] = r.x, ray.org_y[k] = r.y, ray.org_z[k] = r.z;
+    ray.tnear[k] = 0.0f, ray.time[k] = 0.0f, ray.mask[k] = ~0u, ray.id[k] = 0, ray.flags[k] = 0;
+  }
+}
+
 /// Positions as three arrays, so that packets are filled by vector instructions.
 struct PointArrays {
   std::vector<float> x, y, z;
@@ -94,6 +104,8 @@ struct PointArrays {
 }  // namespace
 
 struct EmbreeRays::State {
+  State(const LatticeMesh& m, const ReceiverArray& r, const LightSamples& s) : mesh(m), receivers(r), samples(s) {}
+
   const LatticeMesh& mesh;
   const ReceiverArray& receivers;
   const LightSamples& samples;
@@ -103,7 +115,8 @@ struct EmbreeRays::State {
   std::vector<std::uint32_t> opaque, perforated;  // triangles of the two geometries
   std::vector<TriangleTexture> textures;          // [perforated]
   std::vector<std::uint32_t> blocks;              // block order -> sample
-  PointArrays rows, squares;                      // samples [set][sample], in their own and in block order
+  PointArrays rows, squares;                      // samples [set][padded_count], in their own and in block order
+  std::size_t padded_count = 0;                   // samples of a set, rounded up to whole packets
 
   void add_geometry(RTCScene scene, const std::vector<std::uint32_t>& triangles, bool alpha);
   RTCScene build(bool robust, BuildQuality quality);
@@ -150,29 +163,28 @@ RTCScene EmbreeRays::State::build(bool robust, BuildQuality quality) {
   return scene;
 }
 
-/// All samples of one receiver, `width` at a time.
+/// All samples of one receiver, `width` at a time. The arrays of samples are padded to whole packets.
 template <int width>
 void EmbreeRays::State::trace_receiver(RTCScene scene, RTCIntersectContext& context, std::uint32_t receiver,
                                        bool in_blocks, VisibilityMasks& masks) const {
   const PointArrays& points = in_blocks ? squares : rows;
   const vec3 r = receivers.position[receiver];
-  const std::size_t first = std::size_t{receivers.set[receiver]} * samples.count;
+  const std::size_t first = std::size_t{receivers.set[receiver]} * padded_count;
   std::uint64_t* mask = masks.words.data() + receiver * masks.words_per_receiver;
   alignas(64) int valid[width];
   alignas(64) typename Packet<width>::Ray ray;
+  start_rays<width>(ray, [r](std::size_t) { return r; });
   for (std::uint32_t i = 0; i < samples.count; i += width) {
-    const std::uint32_t lanes = std::min<std::uint32_t>(width, samples.count - i);
-    for (std::uint32_t k = 0; k < width; ++k) {
-      const std::size_t at = first + i + (k < lanes ? k : 0);
+    const float *x = &points.x[first + i], *y = &points.y[first + i], *z = &points.z[first + i];
+    const int lanes = std::min(width, static_cast<int>(samples.count - i));
+    for (int k = 0; k < width; ++k) {
       valid[k] = k < lanes ? -1 : 0;
-      ray.org_x[k] = r.x, ray.org_y[k] = r.y, ray.org_z[k] = r.z;
-      ray.dir_x[k] = points.x[at] - r.x, ray.dir_y[k] = points.y[at] - r.y, ray.dir_z[k] = points.z[at] - r.z;
-      ray.tnear[k] = 0.0f, ray.time[k] = 0.0f, ray.tfar[k] = kTfar;
-      ray.mask[k] = ~0u, ray.id[k] = 0, ray.flags[k] = 0;
+      ray.dir_x[k] = x[k] - r.x, ray.dir_y[k] = y[k] - r.y, ray.dir_z[k] = z[k] - r.z;
+      ray.tfar[k] = kTfar;
     }
     Packet<width>::occluded(valid, scene, &context, &ray);
     std::uint64_t bits = 0;
-    for (std::uint32_t k = 0; k < lanes; ++k) bits |= std::uint64_t{ray.tfar[k] < 0.0f} << k;
+    for (int k = 0; k < lanes; ++k) bits |= std::uint64_t{ray.tfar[k] < 0.0f} << k;
     if (!in_blocks) {
       mask[i / 64] |= bits << (i % 64);  // packet widths divide 64
     } else {
@@ -210,9 +222,8 @@ void EmbreeRays::State::trace_group(RTCScene scene, RTCIntersectContext& context
     valid[k] = k < group.size() ? -1 : 0;
     r[k] = receivers.position[receiver];
     set[k] = samples.set(receivers.set[receiver]).data();
-    ray.org_x[k] = r[k].x, ray.org_y[k] = r[k].y, ray.org_z[k] = r[k].z;
-    ray.tnear[k] = 0.0f, ray.time[k] = 0.0f, ray.mask[k] = ~0u, ray.id[k] = 0, ray.flags[k] = 0;
   }
+  start_rays<width>(ray, [&r](std::size_t k) { return r[k]; });
   for (std::uint32_t i = 0; i < samples.count; ++i) {
     for (std::size_t k = 0; k < width; ++k) {
       const vec3 d = set[k][i] - r[k];
@@ -266,7 +277,7 @@ std::vector<EmbreeMode> embree_modes(std::uint32_t sample_count) {
 
 EmbreeRays::EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
                        int threads)
-    : state_(new State{mesh, receivers, samples}) {
+    : state_(std::make_unique<State>(mesh, receivers, samples)) {
   State& s = *state_;
   s.device = rtcNewDevice(("threads=" + std::to_string(threads)).c_str());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -282,10 +293,12 @@ EmbreeRays::EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, 
     s.perforated.push_back(t);
   }
   s.blocks = block_order(samples.count);
+  s.padded_count = (samples.count + 15) / 16 * 16;
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    for (std::uint32_t i = 0; i < samples.count; ++i) {
-      s.rows.push_back(samples.set(set)[i]);
-      s.squares.push_back(samples.set(set)[s.blocks[i]]);
+    for (std::size_t i = 0; i < s.padded_count; ++i) {
+      const std::size_t sample = std::min<std::size_t>(i, samples.count - 1);
+      s.rows.push_back(samples.set(set)[sample]);
+      s.squares.push_back(samples.set(set)[s.blocks[sample]]);
     }
   }
 }

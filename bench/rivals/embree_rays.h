@@ -31,7 +31,8 @@ std::vector<EmbreeMode> embree_modes(std::uint32_t sample_count);
 /// One scene with its trees, and one light's receivers and samples, all of which must outlive this.
 ///
 /// Rays start at the receiver (tnear 0) and end just before the sample (tfar 1 - 2^-20). The receiver's own triangle is
-/// not excluded: receivers are lifted off it, and a filter callback for every hit would only slow Embree down.
+/// not excluded: receivers are lifted off it (all but a few, see README.md), and a filter callback for every hit would
+/// only slow Embree down.
 /// Alpha-tested triangles are a geometry of their own with an occlusion filter that looks up the nearest texel.
 class EmbreeRays {
  public:

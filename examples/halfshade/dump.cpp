@@ -69,6 +69,15 @@ void write_alpha(const fs::path& directory, const LatticeMesh& mesh, nlohmann::o
   about["alpha_cutoffs"] = cutoffs;
 }
 
+void write_lighting(const fs::path& directory, const LightSamples& samples, const DumpLighting& lighting,
+                    nlohmann::ordered_json& about) {
+  const PixelWindow& w = lighting.window;
+  about["window"] = {w.x0, w.x1, w.y0, w.y1};
+  write_array(directory, "picture_rest.npy", "f4", {w.height(), w.width(), 3}, lighting.rest);
+  write_array(directory, "receiver_response.npy", "f4", {lighting.response.size(), 3}, lighting.response);
+  if (!samples.st.empty()) write_array(directory, "light_st.npy", "f8", {samples.sets, samples.count, 2}, samples.st);
+}
+
 NpyArray read_array(const fs::path& directory, const std::string& name, const std::vector<std::size_t>& shape) {
   NpyArray array = read_npy(directory / name);
   bool fits = array.shape.size() == shape.size();
@@ -159,7 +168,7 @@ void read_masks(const fs::path& directory, std::uint32_t samples, Dump& dump) {
 
 void write_dump(const fs::path& directory, const LatticeMesh& mesh, const ReceiverArray& receivers,
                 const std::vector<std::uint32_t>& receiver_pixels, const LightSamples& samples,
-                const VisibilityMasks& masks, nlohmann::ordered_json about) {
+                const VisibilityMasks& masks, const DumpLighting& lighting, nlohmann::ordered_json about) {
   std::error_code error;
   fs::create_directories(directory, error);
   if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", directory.string(), error.message()));
@@ -174,6 +183,7 @@ void write_dump(const fs::path& directory, const LatticeMesh& mesh, const Receiv
   write_array(directory, "masks.npy", "u1", {count, (masks.sample_count + 7) / 8}, mask_bytes(masks));
   write_triangles(directory, mesh);
   write_alpha(directory, mesh, about);
+  write_lighting(directory, samples, lighting, about);
   const LocalFrame& frame = mesh.frame;
   const dvec3 center = frame.center();
   about["frame"] = {{"center", {center.x, center.y, center.z}},
@@ -213,6 +223,40 @@ void read_dump(const fs::path& directory, Dump& dump) {
     }
   }
   read_masks(directory, dump.samples.count, dump);
+}
+
+DumpLighting read_lighting(const fs::path& directory, Dump& dump) {
+  if (!fs::exists(directory / "light_st.npy")) {
+    throw Error(ErrorCode::kBadInput,
+                fmt::format("{}: light_st.npy is missing: the light has no pattern, or the dump is older than relight",
+                            directory.string()));
+  }
+  DumpLighting lighting;
+  PixelWindow& w = lighting.window;
+  try {
+    const auto window = dump.about.at("window").get<std::array<std::uint32_t, 4>>();
+    w = {window[0], window[1], window[2], window[3]};
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ErrorCode::kBadInput, fmt::format("{}: {}", (directory / "dump.json").string(), e.what()));
+  }
+  if (w.x0 >= w.x1 || w.y0 >= w.y1 || w.x1 > 16384 || w.y1 > 16384) {
+    throw Error(ErrorCode::kBadInput,
+                fmt::format("{}: /window is not x0 < x1, y0 < y1 within 16384", (directory / "dump.json").string()));
+  }
+  const auto rest = read_values<float>(directory, "picture_rest.npy", {w.height(), w.width(), 3});
+  const auto response = read_values<float>(directory, "receiver_response.npy", {dump.receivers.size(), 3});
+  const auto st = read_values<double>(directory, "light_st.npy", {dump.samples.sets, dump.samples.count, 2});
+  for (std::size_t i = 0; i < rest.size(); i += 3) lighting.rest.emplace_back(rest[i], rest[i + 1], rest[i + 2]);
+  for (std::size_t i = 0; i < response.size(); i += 3) {
+    lighting.response.emplace_back(response[i], response[i + 1], response[i + 2]);
+  }
+  for (std::size_t i = 0; i < st.size(); i += 2) {
+    if (!(st[i] >= 0.0 && st[i] < 1.0 && st[i + 1] >= 0.0 && st[i + 1] < 1.0)) {
+      throw Error(ErrorCode::kBadInput, fmt::format("light_st.npy: sample {} is not in [0, 1)", i / 2));
+    }
+    dump.samples.st.emplace_back(st[i], st[i + 1]);
+  }
+  return lighting;
 }
 
 }  // namespace halfshade

@@ -56,9 +56,14 @@ void print_triangles(const Scene& scene) {
 }
 
 void print_light(const Light& light) {
-  static constexpr const char* kNames[] = {"point", "rectangle", "disk", "sphere", "samples"};
+  static constexpr const char* kNames[] = {"point", "rectangle", "disk", "sphere", "samples", "ellipsoid", "polygon"};
+  dvec3 place = light.center;
+  if (!light.points.empty()) {
+    place = dvec3(0.0);
+    for (const dvec3& p : light.points) place += p / static_cast<double>(light.points.size());
+  }
   fmt::print("light        {}: {} at ({:g}, {:g}, {:g}){}\n", light.name, kNames[static_cast<int>(light.shape)],
-             light.center.x, light.center.y, light.center.z, light.two_sided ? ", two-sided" : "");
+             place.x, place.y, place.z, light.two_sided ? ", two-sided" : "");
 }
 
 void print_scene(const std::string& name, const ObjLoadOptions& options) {

@@ -40,9 +40,11 @@ int run(int argc, char** argv) {
       "Exit codes: 0 ok, 1 comparison failed, 2 usage, 3 bad input, 4 limit or memory, 5 output, 130/143 stopped.");
   int exit_code = halfshade::kOk;
   halfshade::add_render(app, joined(argc, argv), exit_code);
+  halfshade::add_accumulate(app, joined(argc, argv));
   halfshade::add_info(app);
   halfshade::add_compare(app, exit_code);
   halfshade::add_verify(app, exit_code);
+  halfshade::add_relight(app, joined(argc, argv));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,41 +1,30 @@
 // halfshade render: scene -> rasterizer -> receivers -> shadow method -> picture, top to bottom.
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
-#include <unistd.h>
 
-#include <cmath>
 #include <cstdio>
-#include <thread>
 
 #include "dump.h"
+#include "halfshade/emission.h"
 #include "picture.h"
+#include "pipeline.h"
 #include "progress.h"
 #include "rasterizer/core/hash.h"
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
-#include "rasterizer/rasterizer.h"
 #include "rasterizer/shading.h"
-#include "scene_source.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
 #include "stats_json.h"
-#include "verbs.h"
 
 namespace halfshade {
 namespace {
 
 using nlohmann::ordered_json;
 
-struct RenderOptions {
-  std::string scene = "builtin:demo", view_file, size = "512x512", crop, method = "afsm", pattern = "rows";
-  std::string output, json, dump, simd;
-  std::uint32_t spp = 1, light_samples = 256, sets = 1, seed = 0, grid = 0;
-  int threads = 0;
+struct RenderOptions : PipelineOptions {
+  std::string output, json, dump;
   double verify_percent = 0.0;
-  bool quiet = false;
-  ObjLoadOptions load;
-  std::string command_line;
 };
 
 /// Results of one light.
@@ -45,88 +34,17 @@ struct LightResult {
   VisibilityMasks masks;
   ShadowStats stats;
   double samples_ms = 0.0, shadow_ms = 0.0;
-  std::vector<float> visibility;  // [G-buffer entry]
+  std::vector<float> visibility;       // [G-buffer entry]
+  std::vector<vec3> visible_emission;  // [G-buffer entry], for lights with an emission image
   std::uint64_t lit = 0, umbra = 0, penumbra = 0;
   std::uint64_t verified = 0, verified_bits = 0, wrong_bits = 0;
 };
 
-struct Render {
+struct Render : Pipeline {
   RenderOptions options;
-  SceneSource source;
-  RasterConfig raster;
-  std::uint32_t subsamples = 1;
-  LatticeMesh mesh;
-  GBuffer gbuffer;
-  RasterStats raster_stats;
   std::vector<LightResult> lights;
-  double load_ms = 0.0, frame_ms = 0.0, rasterize_ms = 0.0, resolve_ms = 0.0, write_ms = 0.0;
+  double resolve_ms = 0.0, write_ms = 0.0;
 };
-
-[[noreturn]] void usage_error(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
-
-void parse_size(const RenderOptions& options, Render& render) {
-  unsigned width = 0, height = 0;
-  int used = 0;
-  if (std::sscanf(options.size.c_str(), "%5ux%5u%n", &width, &height, &used) != 2 || options.size[used] != '\0') {
-    usage_error(fmt::format("--size '{}' is not WIDTHxHEIGHT", options.size));
-  }
-  const auto k = static_cast<std::uint32_t>(std::lround(std::sqrt(options.spp)));
-  if (k * k != options.spp || k < 1 || k > 8)
-    usage_error(fmt::format("--spp {} is not 1, 4, 9, 16, ... 64", options.spp));
-  if (width < 1 || height < 1 || width * k > 16384 || height * k > 16384) {
-    usage_error(
-        fmt::format("--size {} with --spp {}: each side times {} must be in 1..16384", options.size, options.spp, k));
-  }
-  render.subsamples = k;
-  render.raster.width = width * k;
-  render.raster.height = height * k;
-  PixelWindow crop{0, width, 0, height};
-  if (!options.crop.empty()) {
-    if (std::sscanf(options.crop.c_str(), "%5u,%5u,%5u,%5u%n", &crop.x0, &crop.x1, &crop.y0, &crop.y1, &used) != 4 ||
-        options.crop[used] != '\0' || crop.x0 >= crop.x1 || crop.y0 >= crop.y1 || crop.x1 > width || crop.y1 > height) {
-      usage_error(fmt::format("--crop '{}' is not x0,x1,y0,y1 with x0 < x1 <= {} and y0 < y1 <= {}", options.crop,
-                              width, height));
-    }
-  }
-  render.raster.window = {crop.x0 * k, crop.x1 * k, crop.y0 * k, crop.y1 * k};
-}
-
-/// Masks and G-buffer of the worst case, before anything is allocated.
-void check_memory(const Render& render) {
-  const double samples = double(render.raster.window.width()) * render.raster.window.height();
-  const double bytes = samples * (130.0 + 2.0 * 8.0 * std::ceil(render.options.light_samples / 64.0) +
-                                  40.0 * static_cast<double>(render.source.view.lights.size()));
-  const double physical = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-  if (bytes > physical) {
-    throw Error(ErrorCode::kLimit, fmt::format("up to {:.1f} GB would be needed, this machine has {:.1f} GB; render "
-                                               "with --crop, a smaller --size or fewer --light-samples",
-                                               bytes * 1e-9, physical * 1e-9));
-  }
-}
-
-void make_mesh(Render& render) {
-  Stopwatch watch;
-  std::vector<dvec3> reach;
-  for (const Light& light : render.source.view.lights) {
-    const std::vector<dvec3> extent = light_extent(light);
-    reach.insert(reach.end(), extent.begin(), extent.end());
-  }
-  render.mesh = make_lattice_mesh(render.source.scene, make_local_frame(render.source.scene.positions, reach));
-  render.frame_ms = watch.lap();
-  rasterize(render.mesh, render.source.view.camera, render.raster, render.gbuffer, &render.raster_stats);
-  render.rasterize_ms = watch.lap();
-}
-
-ShadowConfig shadow_config(const RenderOptions& options) {
-  ShadowConfig config;
-  config.method = shadow_method_from_name(options.method);
-  config.pattern = sample_pattern_from_name(options.pattern);
-  config.light_sample_count = options.light_samples;
-  config.sample_sets = options.sets;
-  config.seed = options.seed;
-  config.grid_resolution = options.grid;
-  return config;
-}
 
 /// Visibility per G-buffer entry; entries that are no receivers face away from the light: 0.
 void spread_visibility(const GBuffer& gbuffer, LightResult& result) {
@@ -135,6 +53,18 @@ void spread_visibility(const GBuffer& gbuffer, LightResult& result) {
     const std::uint32_t blocked = result.masks.blocked_count(i);
     ++(blocked == 0 ? result.lit : (blocked == result.masks.sample_count ? result.umbra : result.penumbra));
     result.visibility[result.receivers.sample[i]] = result.masks.visibility(i);
+  }
+}
+
+/// Sums of the visible samples' weights; entries that are no receivers get none.
+void spread_emission(const GBuffer& gbuffer, const EmissionImage& image, LightResult& result) {
+  if (image.empty()) return;
+  const std::vector<vec3> weights = sample_emission(image, result.samples);
+  result.visible_emission.assign(gbuffer.size(), vec3(0.0f));
+  for (std::size_t i = 0; i < result.receivers.size(); ++i) {
+    const std::size_t first = std::size_t{result.receivers.set[i]} * result.samples.count;
+    result.visible_emission[result.receivers.sample[i]] =
+        weighted_visibility(result.masks.mask(i), std::span(weights).subspan(first, result.samples.count));
   }
 }
 
@@ -176,6 +106,7 @@ void solve_light(Render& render, const Light& light) {
   }
   result.shadow_ms = watch.lap();
   spread_visibility(render.gbuffer, result);
+  spread_emission(render.gbuffer, light.emission_image, result);
   if (options.verify_percent > 0.0) verify(render, result);
 }
 
@@ -192,21 +123,28 @@ ImageAttributes attributes(const Render& render) {
           {"halfshade.mask_hash", hashes}};
 }
 
+/// The picture of all lights, or of all but the one with number `without`.
+Picture make_picture(const Render& render, std::size_t without = kNone) {
+  std::vector<std::vector<float>> visibility;
+  std::vector<std::vector<vec3>> visible_emission;
+  for (std::size_t i = 0; i < render.lights.size(); ++i) {
+    visibility.push_back(render.lights[i].visibility);
+    visible_emission.push_back(render.lights[i].visible_emission);
+    if (i != without) continue;
+    visibility[i].assign(render.gbuffer.size(), 0.0f);
+    visible_emission[i].clear();
+  }
+  const std::vector<vec3> color =
+      shade(render.gbuffer, render.mesh.frame, render.source.view, visibility, {}, visible_emission, render.cosines);
+  return resolve(render.gbuffer, render.subsamples, render.mesh.frame, render.source.view, color, visibility);
+}
+
 void write_picture_file(Render& render) {
   Stopwatch watch;
-  std::vector<std::vector<float>> visibility;
-  for (const LightResult& light : render.lights) visibility.push_back(light.visibility);
-  const std::vector<vec3> color = shade(render.gbuffer, render.mesh.frame, render.source.view, visibility);
-  const Picture picture =
-      resolve(render.gbuffer, render.subsamples, render.mesh.frame, render.source.view, color, visibility);
+  const Picture picture = make_picture(render);
   render.resolve_ms = watch.lap();
   write_picture(render.options.output, picture, attributes(render));
   render.write_ms = watch.lap();
-}
-
-ordered_json parameters(const RenderOptions& o) {
-  return {{"name", o.method}, {"light_samples", o.light_samples}, {"pattern", o.pattern}, {"sets", o.sets},
-          {"seed", o.seed},   {"grid_resolution", o.grid},        {"exact", true}};
 }
 
 ordered_json light_json(const Render& render, std::size_t index) {
@@ -214,8 +152,8 @@ ordered_json light_json(const Render& render, std::size_t index) {
   ordered_json json = {{"name", render.source.view.lights[index].name},
                        {"samples", light.samples.count},
                        {"samples_ms", light.samples_ms},
-                       {"build_ms", 0.0},  // nothing is kept from frame to frame
-                       {"shadow_ms", light.shadow_ms},
+                       {"build_ms", light.stats.build_ms},
+                       {"shadow_ms", light.shadow_ms - light.stats.build_ms},
                        {"stages", stats_json(light.stats)},
                        {"receivers_lit", light.lit},
                        {"receivers_penumbra", light.penumbra},
@@ -234,9 +172,10 @@ ordered_json run_json(const Render& render) {
   json["machine"] = machine_json();
   json["machine"]["threads"] = tbb::this_task_arena::max_concurrency();
   json["scene"] = {{"name", o.scene}, {"triangles", scene.triangles.size()}, {"hash", scene_hash(scene)}};
-  json["method"] = parameters(o);
+  json["method"] = method_json(o);
   json["size"] = {render.raster.width / render.subsamples, render.raster.height / render.subsamples};
   json["spp"] = o.spp;
+  json["shading"] = o.shading;
   json["milliseconds"] = {{"load", render.load_ms},
                           {"frame", render.frame_ms},
                           {"rasterize", render.rasterize_ms},
@@ -264,6 +203,24 @@ std::vector<std::uint32_t> receiver_pixels(const Render& render, const ReceiverA
   return pixels;
 }
 
+DumpLighting dump_lighting(const Render& render, std::size_t light) {
+  const PixelWindow& window = render.gbuffer.window;
+  const std::uint32_t k = render.subsamples;
+  DumpLighting lighting;
+  lighting.window = {window.x0 / k, window.x1 / k, window.y0 / k, window.y1 / k};
+  const Picture rest = make_picture(render, light);
+  for (std::size_t i = 0; i < rest.color.size(); i += 3) {
+    lighting.rest.emplace_back(rest.color[i], rest.color[i + 1], rest.color[i + 2]);
+  }
+  const std::vector<vec3> response =
+      light_response(render.gbuffer, render.mesh.frame, render.source.view.lights[light],
+                     render.cosines.empty() ? std::span<const float>() : render.cosines[light]);
+  for (const std::uint32_t entry : render.lights[light].receivers.sample) {
+    lighting.response.push_back(response[entry] / static_cast<float>(k * k));
+  }
+  return lighting;
+}
+
 void write_dumps(const Render& render) {
   for (std::size_t i = 0; i < render.lights.size(); ++i) {
     const LightResult& light = render.lights[i];
@@ -275,9 +232,9 @@ void write_dumps(const Render& render) {
                           {"width", render.raster.width / render.subsamples},
                           {"height", render.raster.height / render.subsamples},
                           {"spp", render.options.spp},
-                          {"method", parameters(render.options)}};
+                          {"method", method_json(render.options)}};
     write_dump(directory, render.mesh, light.receivers, receiver_pixels(render, light.receivers), light.samples,
-               light.masks, about);
+               light.masks, dump_lighting(render, i), about);
   }
 }
 
@@ -294,7 +251,7 @@ void print_summary(const Render& render) {
     fmt::print(out, "light {:4} {} samples, {} receivers: {} lit, {} penumbra, {} umbra\n",
                render.source.view.lights[i].name, l.samples.count, l.receivers.size(), l.lit, l.penumbra, l.umbra);
     fmt::print(out, "shadows    {} {:.1f} ms (index {:.1f}, cull {:.1f}, test {:.1f})\n", render.options.method,
-               l.shadow_ms, s.index_ms, s.cull_ms, s.test_ms);
+               l.shadow_ms - s.build_ms, s.index_ms, s.cull_ms, s.test_ms);
     fmt::print(out, "exactness  {} of {} sample tests went to the exact predicate\n", s.exact_fallbacks,
                s.sample_tests);
     if (l.verified > 0) {
@@ -305,20 +262,6 @@ void print_summary(const Render& render) {
   if (!render.options.output.empty()) fmt::print(out, "written    {}\n", render.options.output);
 }
 
-void print_warnings(const Render& render) {
-  for (const std::string& warning : render.source.report.warnings)
-    fmt::print(stderr, "halfshade: warning: {}\n", warning);
-  if (render.source.view_was_made_up)
-    fmt::print(stderr, "halfshade: no view file: camera and light were fitted to the scene\n");
-  std::uint64_t translucent = 0;
-  for (const std::uint32_t m : render.source.scene.triangle_materials)
-    translucent += render.source.scene.materials[m].opacity < 1.0f;
-  if (translucent > 0) {
-    fmt::print(stderr, "halfshade: {} triangles have d < 1; {} treats them as opaque\n", translucent,
-               render.options.method);
-  }
-}
-
 int run(RenderOptions options) {
   Render render;
   render.options = std::move(options);
@@ -326,16 +269,7 @@ int run(RenderOptions options) {
   if (!o.output.empty()) check_picture_path(o.output);
   if (!(o.verify_percent >= 0.0 && o.verify_percent <= 100.0))
     usage_error(fmt::format("--verify {} is not in 0..100", o.verify_percent));
-  if (!o.simd.empty()) force_simd_target(o.simd);
-  shadow_config(o);  // names are checked before the scene is loaded
-  parse_size(o, render);
-  Stopwatch watch;
-  render.source = load_scene(o.scene, o.view_file, o.load);
-  render.load_ms = watch.lap();
-  print_warnings(render);
-  if (render.source.view.lights.empty()) throw Error(ErrorCode::kBadInput, "the view has no light");
-  check_memory(render);
-  make_mesh(render);
+  open_pipeline(o, 0.0, render);
   for (const Light& light : render.source.view.lights) solve_light(render, light);
   if (!o.output.empty()) write_picture_file(render);
   if (!o.dump.empty()) write_dumps(render);
@@ -355,36 +289,15 @@ int run(RenderOptions options) {
 void add_render(CLI::App& app, const std::string& command_line, int& exit_code) {
   CLI::App* verb = app.add_subcommand("render", "Render a scene with exact soft shadows");
   auto o = std::make_shared<RenderOptions>();
-  verb->add_option("scene", o->scene, "OBJ file or builtin:NAME[:SIZE] (see 'halfshade info')")->capture_default_str();
-  verb->add_option("--view", o->view_file, "View file (default: NAME.view.json beside NAME.obj)");
-  verb->add_option("--size", o->size, "Picture in pixels, WIDTHxHEIGHT")->capture_default_str();
-  verb->add_option("--spp", o->spp, "Samples per pixel on a regular grid: 1, 4, 9, 16 ...")->capture_default_str();
-  verb->add_option("--crop", o->crop, "Render only pixels x0 <= x < x1, y0 <= y < y1: x0,x1,y0,y1");
-  verb->add_option("--method", o->method, "Shadow method: afsm, oracle")->capture_default_str();
-  verb->add_option("--light-samples", o->light_samples, "Samples per light, 1..4096")->capture_default_str();
-  verb->add_option("--pattern", o->pattern, "Sample pattern: rows, uniform, stratified")->capture_default_str();
-  verb->add_option("--sets", o->sets, "Different sample sets, chosen per pixel, 1..256")->capture_default_str();
-  verb->add_option("--seed", o->seed, "Seed of patterns and sets")->capture_default_str();
-  verb->add_option("--grid", o->grid, "afsm: cells per axis of the light view, 16..2048 (0 = automatic)")
-      ->capture_default_str();
-  verb->add_option("--threads", o->threads, "Threads (0 = all cores)")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  verb->add_option("--simd", o->simd, "Use only this instruction set (AVX3, AVX2, SSE4, ...)");
+  add_pipeline_options(*verb, *o);
   verb->add_option("-o,--output", o->output, "Picture to write: .png or .exr");
   verb->add_option("--json", o->json, "Statistics as JSON to this file, or - for standard output");
   verb->add_option("--dump", o->dump, "Write receivers, samples, triangles and masks into this directory");
   verb->add_option("--verify", o->verify_percent, "Check this percentage of the receivers with the oracle")
       ->capture_default_str();
-  verb->add_flag("--lenient", o->load.lenient, "Skip wrong faces of the OBJ and count them");
-  verb->add_flag("--strict", o->load.strict, "Missing textures and materials are errors");
-  verb->add_flag("--allow-path", o->load.allow_any_path, "Textures and materials may lie outside the OBJ's directory");
-  verb->add_flag("-q,--quiet", o->quiet, "No progress");
   verb->callback([o, &exit_code, command_line] {
     o->command_line = command_line;
-    const int threads = o->threads > 0 ? o->threads : static_cast<int>(std::thread::hardware_concurrency());
-    tbb::task_arena arena(threads);
-    arena.execute([&] { exit_code = run(*o); });
+    run_in_arena(o->threads, [&] { exit_code = run(*o); });
   });
 }
 

@@ -58,6 +58,7 @@ nlohmann::ordered_json stats_json(const ShadowStats& s) {
           {"exact_fallbacks", s.exact_fallbacks},
           {"lists_occupied", s.lists_occupied},
           {"lists_longest", s.lists_longest},
+          {"certified_blockers", s.certified_blockers},
           {"everywhere_blockers", s.everywhere_blockers},
           {"bytes", s.bytes}};
 }

@@ -11,6 +11,8 @@
 //              which is not the receiver's own, at an opaque texel.
 #pragma once
 
+#include "halfshade/accumulation.h"
+#include "halfshade/emission.h"
 #include "halfshade/error.h"
 #include "halfshade/light.h"
 #include "halfshade/scene.h"

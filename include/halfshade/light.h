@@ -7,7 +7,16 @@
 
 namespace halfshade {
 
-enum class LightShape { kPoint, kRectangle, kDisk, kSphere, kSamples };
+enum class LightShape { kPoint, kRectangle, kDisk, kSphere, kSamples, kEllipsoid, kPolygon };
+
+/// Colours of light over a rectangle, linear RGB >= 0. The image is seen as from the lit side with u to the right and v
+/// upwards: row 0 is the edge at +v / 2.
+struct EmissionImage {
+  std::string name;  // as written in the view file
+  std::uint32_t width = 0, height = 0;
+  std::vector<vec3> rgb;  // [height][width]
+  bool empty() const { return rgb.empty(); }
+};
 
 /// An area light. Which members count depends on `shape`:
 ///   kPoint      center
@@ -15,6 +24,10 @@ enum class LightShape { kPoint, kRectangle, kDisk, kSphere, kSamples };
 ///   kDisk       center, normal, radius; faces `normal`
 ///   kSphere     center, radius
 ///   kSamples    points: explicit, possibly volumetric, sample positions
+///   kEllipsoid  center, axes (half-axis vectors): the image of the unit sphere under p -> center + sum of axes[k]
+///   p[k];
+///               axes that are not orthogonal are allowed
+///   kPolygon    points: 3..64 corners of a flat, convex polygon; faces the side that sees them counter-clockwise
 /// One-sided flat lights give no light to receivers at or behind their plane.
 struct Light {
   std::string name = "light";
@@ -26,6 +39,8 @@ struct Light {
   std::vector<dvec3> points;
   bool two_sided = false;
   vec3 emission{1.0f};
+  std::array<dvec3, 3> axes{dvec3(1, 0, 0), dvec3(0, 1, 0), dvec3(0, 0, 1)};
+  EmissionImage emission_image;  // kRectangle only: replaces `emission` unless empty (emission.h)
 };
 
 /// Pinhole camera, right-handed: looks from `eye` towards `target`; image row 0 is the top.

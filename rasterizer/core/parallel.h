@@ -8,7 +8,9 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_scan.h>
+#include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 
 #if defined(__SSE2__)
@@ -54,6 +56,24 @@ void parallel_tasks(std::size_t count, const Body& body) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
       },
       tbb::simple_partitioner());
+}
+
+/// Sorts by a strict order that has no ties (equal results for any number of threads).
+template <class T, class Before>
+void parallel_sort(std::vector<T>& values, const Before& before) {
+  tbb::parallel_sort(values.begin(), values.end(), before);
+}
+
+/// Both at once, for recursion.
+template <class First, class Second>
+void parallel_pair(const First& first, const Second& second) {
+  const auto guarded = [](const auto& body) {
+    return [&body] {
+      const FpEnvironment environment;
+      body();
+    };
+  };
+  tbb::parallel_invoke(guarded(first), guarded(second));
 }
 
 /// offsets[i] = sum of counts[0..i), offsets[count] = total. `offsets` gets counts.size() + 1 entries.

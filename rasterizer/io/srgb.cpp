@@ -43,6 +43,15 @@ std::uint32_t encode_srgb(float linear, int bits) {
   return static_cast<std::uint32_t>(above - thresholds.begin());
 }
 
+float decode_srgb(float encoded) {
+  static const std::vector<float> table = [] {
+    std::vector<float> values(65536);
+    for (std::uint32_t code = 0; code < 65536; ++code) values[code] = static_cast<float>(decode(code / 65535.0));
+    return values;
+  }();
+  return table[encode_linear(encoded, 16)];
+}
+
 std::uint32_t encode_linear(float value, int bits) {
   if (!(value > 0.0f)) return 0;
   const double largest = (1u << bits) - 1;

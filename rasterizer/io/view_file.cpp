@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "halfshade/error.h"
+#include "rasterizer/io/emission_file.h"
 #include "rasterizer/io/input_file.h"
 
 namespace halfshade {
@@ -18,8 +19,10 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kMostSamples = 4096;
+constexpr std::size_t kMostCorners = 64;  // of a polygon; that it is flat and convex is checked where it is used
 constexpr std::uint64_t kMostFileBytes = std::uint64_t{16} << 20;
-constexpr const char* kShapeNames[] = {"point", "rectangle", "disk", "sphere", "samples"};  // by LightShape
+constexpr const char* kShapeNames[] = {"point",   "rectangle", "disk",   "sphere",
+                                       "samples", "ellipsoid", "polygon"};  // by LightShape
 
 /// A value of the file together with where it is, for messages.
 class Node {
@@ -50,6 +53,7 @@ class Node {
   }
   Node at(std::size_t index) const { return {value_.at(index), file_, fmt::format("{}/{}", pointer_, index)}; }
   std::size_t size() const { return value_.size(); }
+  bool is_text() const { return value_.is_string(); }
   bool is_number() const { return value_.is_number(); }
 
   void require_array(const char* what) const {
@@ -77,6 +81,15 @@ class Node {
   bool boolean() const {
     if (!value_.is_boolean()) throw refuse("true or false");
     return value_.get<bool>();
+  }
+  /// A file named by the value, relative to the view file and inside its directory (as textures of an OBJ).
+  std::filesystem::path file() const {
+    const std::filesystem::path directory = std::filesystem::path(file_).parent_path();
+    try {
+      return AssetRoot(directory, false).resolve(directory, text());
+    } catch (const Error& reason) {
+      throw error(reason.what());
+    }
   }
   std::string text() const {
     if (!value_.is_string()) throw refuse("a string");
@@ -109,10 +122,15 @@ Camera read_camera(const Node& node) {
   return camera;
 }
 
-vec3 read_emission(const Node& node) {
+void read_emission(const Node& node, Light& light) {
+  if (node.is_text() && light.shape == LightShape::kRectangle) {
+    light.emission_image = load_emission_image(node.file());
+    light.emission_image.name = node.text();
+    return;
+  }
   const dvec3 emission = node.is_number() ? dvec3(node.number()) : node.vector();
   if (emission.x < 0.0 || emission.y < 0.0 || emission.z < 0.0) throw node.refuse("numbers >= 0");
-  return vec3(emission);
+  light.emission = vec3(emission);
 }
 
 LightShape read_shape(const Node& node) {
@@ -122,14 +140,20 @@ LightShape read_shape(const Node& node) {
   return static_cast<LightShape>(found - std::begin(kShapeNames));
 }
 
-std::vector<dvec3> read_points(const Node& node) {
+std::vector<dvec3> read_points(const Node& node, std::size_t fewest, std::size_t most) {
   node.require_array("an array of points");
-  if (node.size() < 1 || node.size() > kMostSamples) {
-    throw node.error(fmt::format("{} points, allowed 1..{}", node.size(), kMostSamples));
+  if (node.size() < fewest || node.size() > most) {
+    throw node.error(fmt::format("{} points, allowed {}..{}", node.size(), fewest, most));
   }
   std::vector<dvec3> points;
   for (std::size_t i = 0; i < node.size(); ++i) points.push_back(node.at(i).vector());
   return points;
+}
+
+std::array<dvec3, 3> read_axes(const Node& node) {
+  node.require_array("three vectors");
+  if (node.size() != 3) throw node.refuse("three vectors");
+  return {node.at(std::size_t{0}).nonzero_vector(), node.at(1).nonzero_vector(), node.at(2).nonzero_vector()};
 }
 
 void read_rectangle(const Node& node, Light& light) {
@@ -162,7 +186,16 @@ void read_geometry(const Node& node, Light& light) {
       break;
     case LightShape::kSamples:
       node.require_keys({"name", "type", "emission", "points"});
-      light.points = read_points(node.at("points"));
+      light.points = read_points(node.at("points"), 1, kMostSamples);
+      break;
+    case LightShape::kEllipsoid:
+      node.require_keys({"name", "type", "emission", "center", "axes"});
+      light.center = node.at("center").vector();
+      light.axes = read_axes(node.at("axes"));
+      break;
+    case LightShape::kPolygon:
+      node.require_keys({"name", "type", "emission", "two_sided", "vertices"});
+      light.points = read_points(node.at("vertices"), 3, kMostCorners);
       break;
   }
 }
@@ -183,7 +216,7 @@ Light read_light(const Node& node) {
   read_geometry(node, light);
   if (node.has("name")) light.name = read_name(node.at("name"));
   if (node.has("two_sided")) light.two_sided = node.at("two_sided").boolean();
-  if (node.has("emission")) light.emission = read_emission(node.at("emission"));
+  if (node.has("emission")) read_emission(node.at("emission"), light);
   return light;
 }
 
@@ -213,19 +246,28 @@ ordered_json to_object(const Light& light) {
   ordered_json object;
   object["name"] = light.name;
   object["type"] = kShapeNames[static_cast<std::size_t>(light.shape)];
-  const bool is_flat = light.shape == LightShape::kRectangle || light.shape == LightShape::kDisk;
+  const bool is_flat =
+      light.shape == LightShape::kRectangle || light.shape == LightShape::kDisk || light.shape == LightShape::kPolygon;
   if (light.shape == LightShape::kPoint) {
     object["position"] = to_array(light.center);
-  } else if (light.shape == LightShape::kSamples) {
-    for (const dvec3& point : light.points) object["points"].push_back(to_array(point));
+  } else if (light.shape == LightShape::kSamples || light.shape == LightShape::kPolygon) {
+    const char* key = light.shape == LightShape::kPolygon ? "vertices" : "points";
+    for (const dvec3& point : light.points) object[key].push_back(to_array(point));
   } else {
     object["center"] = to_array(light.center);
   }
   if (light.shape == LightShape::kRectangle) object["u"] = to_array(light.u), object["v"] = to_array(light.v);
+  if (light.shape == LightShape::kEllipsoid) {
+    for (const dvec3& axis : light.axes) object["axes"].push_back(to_array(axis));
+  }
   if (light.shape == LightShape::kDisk) object["normal"] = to_array(light.normal);
   if (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere) object["radius"] = light.radius;
   if (is_flat) object["two_sided"] = light.two_sided;
-  object["emission"] = to_array(light.emission);
+  if (light.emission_image.empty()) {
+    object["emission"] = to_array(light.emission);
+  } else {
+    object["emission"] = light.emission_image.name;
+  }
   return object;
 }
 

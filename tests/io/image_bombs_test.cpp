@@ -71,7 +71,7 @@ void check_bomb(const std::string& bytes) {
   CHECK(outcome.threw);
   CHECK((outcome.code == ErrorCode::kBadInput || outcome.code == ErrorCode::kLimit));
   CHECK(outcome.has("bomb: "));
-  CHECK(outcome.seconds < kHang);
+  CHECK(outcome.seconds < test::kHang);
   CHECK(memory.growth() < 64.0);
 }
 

@@ -73,7 +73,7 @@ TEST_CASE("S36 obj_faults: a wrong line is refused with file, line, value and ra
     CHECK(outcome.code == ErrorCode::kBadInput);
     CHECK(outcome.has("bad.obj:4: "));
     for (const char* part : fault.expect) CHECK(outcome.has(part));
-    CHECK(outcome.seconds < kHang);
+    CHECK(outcome.seconds < test::kHang);
   }
   CHECK(memory.growth() < 16.0);
 }
@@ -146,7 +146,7 @@ TEST_CASE("S36 obj_faults: directories, devices, fifos and missing files are ref
     CAPTURE(outcome.message);
     CHECK(outcome.code == ErrorCode::kBadInput);
     CHECK(outcome.has(expected));
-    CHECK(outcome.seconds < kHang);
+    CHECK(outcome.seconds < test::kHang);
   }
 }
 
@@ -166,7 +166,7 @@ TEST_CASE("S36 obj_faults: a face of 65535 corners is read, one of 65536 is not"
     for (std::size_t i = 0; i < corners; ++i) face += i % 3 == 0 ? " 1" : i % 3 == 1 ? " 2" : " 3";
     const auto outcome = load(scratch.write("face.obj", text + face + "\n"));
     CHECK(outcome.threw == (corners == 65536u));
-    CHECK(outcome.seconds < kHang);
+    CHECK(outcome.seconds < test::kHang);
   }
 }
 

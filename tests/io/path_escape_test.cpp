@@ -54,7 +54,7 @@ TEST_CASE("S39 path_escape: libraries outside the scene's directory are refused"
     CHECK(outcome.code == ErrorCode::kBadInput);
     CHECK(outcome.has("a.obj:2: mtllib"));
     CHECK(outcome.has("outside"));
-    CHECK(outcome.seconds < kHang);
+    CHECK(outcome.seconds < test::kHang);
   }
 }
 
@@ -71,7 +71,7 @@ TEST_CASE("S39 path_escape: textures outside the scene's directory are refused")
       CHECK(outcome.code == ErrorCode::kBadInput);
       CHECK(outcome.has("m.mtl:2: " + keyword));
       CHECK(outcome.has("outside"));
-      CHECK(outcome.seconds < kHang);
+      CHECK(outcome.seconds < test::kHang);
     }
   }
 }
@@ -86,7 +86,7 @@ TEST_CASE("S39 path_escape: fifos, directories and devices are refused even wher
         CAPTURE(outcome.message);
         CHECK(outcome.code == ErrorCode::kBadInput);
         CHECK(outcome.threw);
-        CHECK(outcome.seconds < kHang);
+        CHECK(outcome.seconds < test::kHang);
       }
     }
   }

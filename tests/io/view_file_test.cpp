@@ -1,5 +1,7 @@
 #include "rasterizer/io/view_file.h"
 
+#include "rasterizer/io/image.h"
+
 #include "scratch.h"
 
 namespace halfshade {
@@ -17,13 +19,13 @@ test::Outcome load(const std::string& text) {
 View make_view() {
   View view;
   view.camera = {{0.1, 0.2, 5.3}, {1.0 / 3.0, -2.0, 0.0}, {0.0, 0.9, 0.1}, 38.7};
-  view.lights.resize(5);
-  for (std::size_t i = 0; i < 5; ++i) {
+  view.lights.resize(7);
+  for (std::size_t i = 0; i < view.lights.size(); ++i) {
     Light& light = view.lights[i];
     light.name = "light " + std::to_string(i);
     light.shape = static_cast<LightShape>(i);
     light.emission = vec3(0.1f, 2.0f, 0.3f);
-    if (light.shape != LightShape::kSamples) light.center = {0.1, 4.7, -0.3};
+    if (light.shape != LightShape::kSamples && light.shape != LightShape::kPolygon) light.center = {0.1, 4.7, -0.3};
   }
   view.lights[1].u = {0.3, 0.0, 0.1};
   view.lights[1].v = {0.0, 0.7, 0.1};
@@ -31,6 +33,9 @@ View make_view() {
   view.lights[2].normal = {0.1, -0.9, 0.0};
   view.lights[2].radius = view.lights[3].radius = 1.0 / 7.0;
   view.lights[4].points = {{1, 2, 3}, {0.1, 0.2, 0.3}};
+  view.lights[5].axes = {dvec3(0.1, 0.2, 0.3), dvec3(-1.0 / 3.0, 1, 0), dvec3(0, 0.7, 0.1)};
+  view.lights[6].points = {{0, 4, 0}, {1, 4, 0}, {1.0 / 3.0, 4, 1}};
+  view.lights[6].two_sided = true;
   return view;
 }
 
@@ -54,6 +59,7 @@ TEST_CASE("a view of all light types survives writing and reading to the last bi
     CHECK(a.normal == b.normal);
     CHECK(a.radius == b.radius);
     CHECK(a.points == b.points);
+    CHECK(a.axes == b.axes);
     CHECK(a.two_sided == b.two_sided);
     CHECK(a.emission == b.emission);
   }
@@ -70,6 +76,35 @@ TEST_CASE("up, fov, emission and two_sided have defaults, and emission may be on
   CHECK_FALSE(view.lights[0].two_sided);
   CHECK(view.lights[0].emission == vec3(1.0f));
   CHECK(view.lights[1].emission == vec3(2.5f));
+}
+
+TEST_CASE("a rectangle's emission may be an image beside the view file, made linear and written back by name") {
+  const Scratch scratch;
+  const float values[] = {1.0f, 0.0f, 0.0f, 0.2f, 0.5f, 1.0f};
+  write_png(scratch.path("e.png"), 2, 1, 3, values, true, 16, {});
+  const std::string light =
+      R"({"type": "rectangle", "center": [0, 4, 0], "u": [1, 0, 0], "v": [0, 0, 1], "emission": )";
+  const auto view_of = [&](const std::string& emission) {
+    return load_view(
+        scratch.write("a.json", std::string("{") + kCamera + R"(, "lights": [)" + light + emission + "}]}"));
+  };
+  const View view = view_of("\"e.png\"");
+  const EmissionImage& image = view.lights[0].emission_image;
+  CHECK(image.width == 2);
+  CHECK(image.height == 1);
+  for (int k = 0; k < 6; ++k) CHECK(image.rgb[k / 3][k % 3] == doctest::Approx(values[k]).epsilon(1e-4));
+  CHECK(view_to_json(view).find("\"emission\": \"e.png\"") != std::string::npos);
+  CHECK(test::outcome_of([&] { view_of("\"../e.png\""); }).has("/lights/0/emission: "));
+  CHECK(test::outcome_of([&] { view_of("\"missing.png\""); }).code == ErrorCode::kBadInput);
+  scratch.write("e.png", "no picture");
+  CHECK(test::outcome_of([&] { view_of("\"e.png\""); }).code == ErrorCode::kBadInput);
+  const ImageChannel grey{"Y", ImageChannel::Type::kFloat, values};
+  const float negative = -1.0f;
+  const ImageChannel dark{"Y", ImageChannel::Type::kFloat, &negative};
+  write_exr(scratch.path("e.exr"), 2, 1, {&grey, 1}, {});
+  CHECK(view_of("\"e.exr\"").lights[0].emission_image.rgb[0] == vec3(1.0f));
+  write_exr(scratch.path("e.exr"), 1, 1, {&dark, 1}, {});
+  CHECK(test::outcome_of([&] { view_of("\"e.exr\""); }).has("emission -1"));
 }
 
 TEST_CASE("wrong cameras are refused with file, place, value and what is allowed") {
@@ -99,8 +134,11 @@ TEST_CASE("wrong cameras are refused with file, place, value and what is allowed
 TEST_CASE("wrong lights are refused with file, place, value and what is allowed") {
   const std::pair<const char*, const char*> lights[] = {
       {R"({"type": "sun", "direction": [0, -1, 0]})",
-       "/lights/0/type: '\"sun\"', allowed one of point, rectangle, disk, sphere, samples"},
-      {R"({"type": "polygon", "vertices": []})", "allowed one of point, rectangle, disk, sphere, samples"},
+       "/lights/0/type: '\"sun\"', allowed one of point, rectangle, disk, sphere, samples, ellipsoid, polygon"},
+      {R"({"type": "polygon", "vertices": [[0, 4, 0], [1, 4, 0]]})", "/lights/0/vertices: 2 points, allowed 3..64"},
+      {R"({"type": "ellipsoid", "center": [0, 4, 0], "axes": [[1, 0, 0], [0, 1, 0]]})",
+       "/lights/0/axes: '[[1,0,0],[0,1,0]]', allowed three vectors"},
+      {R"({"type": "ellipsoid", "center": [0, 4, 0], "axes": [[1, 0, 0], [0, 1, 0], [0, 0, 0]]})", "/lights/0/axes/2"},
       {R"({"center": [0, 4, 0]})", "/lights/0: key 'type' is missing"},
       {R"({"type": "rectangle", "center": [0, 4, 0], "u": [1, 0, 0], "v": [2, 0, 0]})",
        "/lights/0/v: '[2,0,0]', allowed a vector that is not parallel to u"},

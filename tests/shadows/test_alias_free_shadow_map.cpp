@@ -34,6 +34,11 @@ Light light_of_shape(LightShape shape, Random& random) {
   light.two_sided = true;
   light.normal = {0.3, -1.0, 0.2};
   light.radius = 0.8;
+  light.axes = {dvec3(0.9, 0.3, 0.0), dvec3(-0.2, 0.5, 0.4), dvec3(0.1, -0.1, 0.3)};  // not orthogonal
+  if (shape == LightShape::kPolygon) {
+    light.points = {{-1.0, 4.0, -0.5}, {0.2, 4.3, -1.1}, {1.2, 4.4, -0.4}, {0.8, 4.1, 0.8}, {-0.6, 3.9, 0.4}};
+    for (dvec3& p : light.points) p.y = 4.0 + 0.2 * p.x - 0.1 * p.z;
+  }
   if (shape == LightShape::kSamples) {
     for (int i = 0; i < 70; ++i) light.points.push_back(light.center + random.in_box(-1.0, 1.0));
   }
@@ -43,8 +48,8 @@ Light light_of_shape(LightShape shape, Random& random) {
 }  // namespace
 
 TEST_CASE("masks equal the oracle for every light shape among random triangles") {
-  for (const LightShape shape :
-       {LightShape::kPoint, LightShape::kRectangle, LightShape::kDisk, LightShape::kSphere, LightShape::kSamples}) {
+  for (const LightShape shape : {LightShape::kPoint, LightShape::kRectangle, LightShape::kDisk, LightShape::kSphere,
+                                 LightShape::kSamples, LightShape::kEllipsoid, LightShape::kPolygon}) {
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
       CAPTURE(static_cast<int>(shape));
       CAPTURE(seed);
@@ -55,6 +60,47 @@ TEST_CASE("masks equal the oracle for every light shape among random triangles")
       config.pattern = seed % 3 == 0 ? SamplePattern::kStratified : SamplePattern::kRows;
       config.sample_sets = seed % 2 == 0 ? 4 : 1;
       CHECK(wrong_bits_of_exact_methods(scene, receivers, light_of_shape(shape, random), config) == 0);
+    }
+  }
+}
+
+TEST_CASE("masks equal the oracle for long, thin, flat and tiny ellipsoids, and for a sliver of a polygon") {
+  const std::array<std::array<dvec3, 3>, 5> ellipsoids = {{{dvec3(3, 0, 0), dvec3(0, 0.1, 0), dvec3(0, 0, 0.1)},
+                                                           {dvec3(1, 1, 0), dvec3(1, 0.8, 0.1), dvec3(0, 0.2, 1)},
+                                                           {dvec3(1, 0, 0), dvec3(0, 0, 1), dvec3(0, 1e-9, 0)},
+                                                           {dvec3(1, 0, 0), dvec3(2, 0, 0), dvec3(0, 0.3, 0)},
+                                                           {dvec3(1e-6, 0, 0), dvec3(0, 3e-6, 0), dvec3(0, 0, 1e-6)}}};
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    CAPTURE(seed);
+    Random random(seed + 40);
+    const Scene scene = scene_of(random_triangles(random, 150, seed % 2 == 0 ? 3.0 : 0.7));
+    const std::vector<Receiver> receivers = receivers_at(random_points(random, 500, -6.0, 6.0));
+    Light light = frame_light();
+    light.shape = seed == 6 ? LightShape::kPolygon : LightShape::kEllipsoid;
+    if (seed == 6) light.points = {{-1, 4, 0}, {1, 4, 0}, {1.5, 4, 0.00001}, {0, 4, 0.001}};
+    if (seed < 6) light.axes = ellipsoids[seed - 1];
+    light.two_sided = true;
+    CHECK(wrong_bits_of_exact_methods(scene, receivers, light, frame_config(100)) == 0);
+  }
+}
+
+TEST_CASE("masks equal the oracle for every pattern, with sets chosen by hash, interleaved and rotated") {
+  for (const SamplePattern pattern : {SamplePattern::kRows, SamplePattern::kUniform, SamplePattern::kStratified,
+                                      SamplePattern::kLowDiscrepancy, SamplePattern::kPoissonDisk}) {
+    CAPTURE(static_cast<int>(pattern));
+    Random random(static_cast<std::uint64_t>(pattern) + 70);
+    const Scene scene = scene_of(random_triangles(random, 120, 1.5));
+    const std::vector<Receiver> receivers = receivers_at(random_points(random, 400, -6.0, 6.0));
+    for (const LightShape shape : {LightShape::kDisk, LightShape::kSphere, LightShape::kPolygon}) {
+      const Light light = light_of_shape(shape, random);
+      ShadowConfig config = frame_config(90);
+      config.pattern = pattern;
+      config.sample_sets = 5;
+      CHECK(wrong_bits_of_exact_methods(scene, receivers, light, config) == 0);
+      config.rotate_sets = true;
+      CHECK(wrong_bits_of_exact_methods(scene, receivers, light, config) == 0);
+      config.interleave = true;
+      CHECK(wrong_bits_of_exact_methods(scene, receivers, light, config) == 0);
     }
   }
 }

@@ -100,7 +100,7 @@ TEST_CASE("sample order: restoring a kernel mask gives every sample its own bit"
     for (std::uint32_t i = 0; i < count; ++i) {
       std::vector<std::uint64_t> kernel_mask(k.padded / 64, 0), mask(k.padded / 64, 0);
       kernel_mask[i / 64] = std::uint64_t{1} << (i % 64);
-      restore_sample_order(k, kernel_mask, mask);
+      restore_sample_order(k, 0, kernel_mask, mask);
       const std::uint32_t sample = k.order[i];
       CHECK(mixture.samples.points[sample] == k.points[i]);
       std::vector<std::uint64_t> expected(mask.size(), 0);

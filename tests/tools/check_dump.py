@@ -19,6 +19,8 @@ Exit code: 0 every checked bit is right, 1 some are wrong, 2 the dump cannot be 
 """
 
 import argparse
+import ctypes
+import ctypes.util
 import json
 import pathlib
 import sys
@@ -49,6 +51,29 @@ def integers(values, name):
     if not np.all(np.isfinite(values)) or np.any(units != np.rint(units)) or np.any(np.abs(values) > 2.0):
         raise BadDump(f"{name}: a value is not on the lattice of 2^-38 in [-2, 2]")
     return units
+
+
+def find_xxh3_128():
+    """A function from bytes to 32 hexadecimal digits: python3-xxhash, or the C library by itself, or None."""
+    try:
+        import xxhash
+        return xxhash.xxh3_128_hexdigest
+    except ImportError:
+        name = ctypes.util.find_library("xxhash")
+
+    class Digest(ctypes.Structure):
+        _fields_ = [("low", ctypes.c_uint64), ("high", ctypes.c_uint64)]
+
+    if name is None or not hasattr(ctypes.CDLL(name), "XXH3_128bits"):
+        return None
+    function = ctypes.CDLL(name).XXH3_128bits
+    function.restype, function.argtypes = Digest, [ctypes.c_char_p, ctypes.c_size_t]
+
+    def hexdigest(content):
+        digest = function(content, len(content))
+        return f"{digest.high:016x}{digest.low:016x}"
+
+    return hexdigest
 
 
 class Dump:
@@ -91,16 +116,15 @@ class Dump:
             self.thresholds.append(Fraction(cutoff) * 255)
 
     def mask_hash(self):
-        """XXH3-128 over both counts and the masks padded to 64-bit words; None without the xxhash module."""
-        try:
-            import xxhash
-        except ImportError:
+        """XXH3-128 over both counts and the masks padded to 64-bit words; None where nothing can compute it."""
+        digest = find_xxh3_128()
+        if digest is None:
             return None
         count, samples = self.blocked.shape
         padded = np.zeros((count, (samples + 63) // 64 * 64), dtype=bool)
         padded[:, :samples] = self.blocked
         words = np.packbits(padded, axis=1, bitorder="little")
-        return xxhash.xxh3_128_hexdigest(np.array([count, samples], dtype="<u8").tobytes() + words.tobytes())
+        return digest(np.array([count, samples], dtype="<u8").tobytes() + words.tobytes())
 
 
 def det(a, b, c):
@@ -258,7 +282,7 @@ def check(options):
     print(f"wrong      {wrong_bits} bits in {wrong_receivers} receivers")
     digest = dump.mask_hash()
     if digest is None:
-        print("mask hash  not checked (no python3-xxhash)")
+        print("mask hash  not checked (neither python3-xxhash nor libxxhash is here)")
     else:
         print(f"mask hash  {'right' if digest == dump.about['mask_hash'] else 'WRONG: ' + digest}")
     return 0 if wrong_bits == 0 and digest in (None, dump.about["mask_hash"]) else 1

@@ -1,0 +1,182 @@
+#include "pipeline.h"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "halfshade/error.h"
+#include "rasterizer/core/stopwatch.h"
+#include "shadows/solver.h"
+#include "stats_json.h"
+
+namespace halfshade {
+namespace {
+
+void parse_size(const PipelineOptions& options, Pipeline& pipeline) {
+  unsigned width = 0, height = 0;
+  int used = 0;
+  if (std::sscanf(options.size.c_str(), "%5ux%5u%n", &width, &height, &used) != 2 || options.size[used] != '\0') {
+    usage_error(fmt::format("--size '{}' is not WIDTHxHEIGHT", options.size));
+  }
+  const auto k = static_cast<std::uint32_t>(std::lround(std::sqrt(options.spp)));
+  if (k * k != options.spp || k < 1 || k > 8)
+    usage_error(fmt::format("--spp {} is not 1, 4, 9, 16, ... 64", options.spp));
+  if (width < 1 || height < 1 || width * k > 16384 || height * k > 16384) {
+    usage_error(
+        fmt::format("--size {} with --spp {}: each side times {} must be in 1..16384", options.size, options.spp, k));
+  }
+  pipeline.subsamples = k;
+  pipeline.raster.width = width * k;
+  pipeline.raster.height = height * k;
+  PixelWindow crop{0, width, 0, height};
+  if (!options.crop.empty()) {
+    if (std::sscanf(options.crop.c_str(), "%5u,%5u,%5u,%5u%n", &crop.x0, &crop.x1, &crop.y0, &crop.y1, &used) != 4 ||
+        options.crop[used] != '\0' || crop.x0 >= crop.x1 || crop.y0 >= crop.y1 || crop.x1 > width || crop.y1 > height) {
+      usage_error(fmt::format("--crop '{}' is not x0,x1,y0,y1 with x0 < x1 <= {} and y0 < y1 <= {}", options.crop,
+                              width, height));
+    }
+  }
+  pipeline.raster.window = {crop.x0 * k, crop.x1 * k, crop.y0 * k, crop.y1 * k};
+}
+
+/// Masks and G-buffer of the worst case, before anything is allocated.
+void check_memory(const PipelineOptions& options, double extra_bytes_per_sample, const Pipeline& pipeline) {
+  const double samples = double(pipeline.raster.window.width()) * pipeline.raster.window.height();
+  const double bytes =
+      samples * (130.0 + 2.0 * 8.0 * std::ceil(options.light_samples / 64.0) +
+                 (40.0 + extra_bytes_per_sample) * static_cast<double>(pipeline.source.view.lights.size()));
+  const double physical = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
+  if (bytes > physical) {
+    throw Error(ErrorCode::kLimit, fmt::format("up to {:.1f} GB would be needed, this machine has {:.1f} GB; render "
+                                               "with --crop, a smaller --size or fewer --light-samples",
+                                               bytes * 1e-9, physical * 1e-9));
+  }
+}
+
+void make_mesh(Pipeline& pipeline) {
+  Stopwatch watch;
+  std::vector<dvec3> reach;
+  for (const Light& light : pipeline.source.view.lights) {
+    const std::vector<dvec3> extent = light_extent(light);
+    reach.insert(reach.end(), extent.begin(), extent.end());
+  }
+  pipeline.mesh = make_lattice_mesh(pipeline.source.scene, make_local_frame(pipeline.source.scene.positions, reach));
+  pipeline.frame_ms = watch.lap();
+}
+
+void print_warnings(const PipelineOptions& options, const Pipeline& pipeline) {
+  for (const std::string& warning : pipeline.source.report.warnings)
+    fmt::print(stderr, "halfshade: warning: {}\n", warning);
+  if (pipeline.source.view_was_made_up)
+    fmt::print(stderr, "halfshade: no view file: camera and light were fitted to the scene\n");
+  std::uint64_t translucent = 0;
+  for (const std::uint32_t m : pipeline.source.scene.triangle_materials)
+    translucent += pipeline.source.scene.materials[m].opacity < 1.0f;
+  if (translucent > 0) {
+    fmt::print(stderr, "halfshade: {} triangles have d < 1; {} treats them as opaque\n", translucent, options.method);
+  }
+}
+
+}  // namespace
+
+void draw(const PipelineOptions& options, Pipeline& pipeline) {
+  const View& view = pipeline.source.view;
+  Stopwatch watch;
+  rasterize(pipeline.mesh, view.camera, pipeline.raster, pipeline.gbuffer, &pipeline.raster_stats);
+  pipeline.rasterize_ms = watch.lap();
+  if (options.shading != "bent") return;
+  if (!pipeline.bent_normals) pipeline.bent_normals.emplace(pipeline.mesh);
+  pipeline.cosines.clear();
+  for (const Light& light : view.lights) {
+    pipeline.cosines.push_back(pipeline.bent_normals->cosines(pipeline.gbuffer, view.camera, light));
+  }
+}
+
+void usage_error(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
+
+ShadowConfig shadow_config(const PipelineOptions& options) {
+  ShadowConfig config;
+  config.method = shadow_method_from_name(options.method);
+  config.pattern = sample_pattern_from_name(options.pattern);
+  config.light_sample_count = options.light_samples;
+  config.sample_sets = options.sets;
+  config.interleave = options.interleave;
+  config.rotate_sets = options.rotate;
+  config.seed = options.seed;
+  config.grid_resolution = options.grid;
+  config.back_face_casters = !options.all_faces;
+  return config;
+}
+
+nlohmann::ordered_json method_json(const PipelineOptions& o) {
+  return {{"name", o.method},
+          {"light_samples", o.light_samples},
+          {"pattern", o.pattern},
+          {"sets", o.interleave ? kInterleavedSets : o.sets},
+          {"interleave", o.interleave},
+          {"rotate", o.rotate},
+          {"seed", o.seed},
+          {"grid_resolution", o.grid},
+          {"exact", true}};
+}
+
+void run_in_arena(int threads, const std::function<void()>& body) {
+  tbb::task_arena arena(threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency()));
+  arena.execute(body);
+}
+
+void open_pipeline(const PipelineOptions& options, double extra_bytes_per_sample, Pipeline& pipeline) {
+  if (!options.simd.empty()) force_simd_target(options.simd);
+  shadow_config(options);  // names are checked before the scene is loaded
+  if (options.shading != "plain" && options.shading != "bent")
+    usage_error(fmt::format("shading '{}' is not one of: plain, bent", options.shading));
+  parse_size(options, pipeline);
+  Stopwatch watch;
+  pipeline.source = load_scene(options.scene, options.view_file, options.load);
+  pipeline.load_ms = watch.lap();
+  print_warnings(options, pipeline);
+  if (pipeline.source.view.lights.empty()) throw Error(ErrorCode::kBadInput, "the view has no light");
+  check_memory(options, extra_bytes_per_sample, pipeline);
+  make_mesh(pipeline);
+  draw(options, pipeline);
+}
+
+void add_pipeline_options(CLI::App& verb, PipelineOptions& options) {
+  verb.add_option("scene", options.scene, "OBJ file or builtin:NAME[:SIZE] (see 'halfshade info')")
+      ->capture_default_str();
+  verb.add_option("--view", options.view_file, "View file (default: NAME.view.json beside NAME.obj)");
+  verb.add_option("--size", options.size, "Picture in pixels, WIDTHxHEIGHT")->capture_default_str();
+  verb.add_option("--spp", options.spp, "Samples per pixel on a regular grid: 1, 4, 9, 16 ...")->capture_default_str();
+  verb.add_option("--crop", options.crop, "Render only pixels x0 <= x < x1, y0 <= y < y1: x0,x1,y0,y1");
+  verb.add_option("--shading", options.shading,
+                  "plain: interpolated normals; bent: also fade out where facets turn away from the light")
+      ->capture_default_str();
+  verb.add_option("--method", options.method, "Shadow method: exact, afsm, oracle")->capture_default_str();
+  verb.add_option("--light-samples", options.light_samples, "Samples per light, 1..4096")->capture_default_str();
+  verb.add_option("--pattern", options.pattern,
+                  "Sample pattern: rows, uniform, stratified, low-discrepancy, poisson-disk")
+      ->capture_default_str();
+  verb.add_option("--sets", options.sets, "Different sample sets, chosen per pixel, 1..256")->capture_default_str();
+  verb.add_flag("--interleave", options.interleave, "16 sets in a fixed 4x4 pattern of pixels instead of --sets");
+  verb.add_flag("--rotate", options.rotate, "Disk and sphere lights: sets are rotated copies of a single one");
+  verb.add_option("--seed", options.seed, "Seed of patterns and sets")->capture_default_str();
+  verb.add_flag("--all-faces", options.all_faces,
+                "afsm: front faces of closed meshes cast as well (for measuring: changes no bit)");
+  verb.add_option("--grid", options.grid, "afsm: cells per axis of the light view, 16..2048 (0 = automatic)")
+      ->capture_default_str();
+  verb.add_option("--threads", options.threads, "Threads (0 = all cores)")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  verb.add_option("--simd", options.simd, "Use only this instruction set (AVX3, AVX2, SSE4, ...)");
+  verb.add_flag("--lenient", options.load.lenient, "Skip wrong faces of the OBJ and count them");
+  verb.add_flag("--strict", options.load.strict, "Missing textures and materials are errors");
+  verb.add_flag("--allow-path", options.load.allow_any_path,
+                "Textures and materials may lie outside the OBJ's directory");
+  verb.add_flag("-q,--quiet", options.quiet, "No progress");
+}
+
+}  // namespace halfshade

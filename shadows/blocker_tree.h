@@ -1,0 +1,57 @@
+// Tree over blockers for receivers that gather: leaves of up to 16 triangles laid out for SIMD, nodes of up to 16
+// boxes.
+//
+// Topology and order depend on the mesh alone. The boxes are axis-aligned in the light's frame (u, v in the light's
+// plane, z along its facing) and refitted for each light.
+#pragma once
+
+#include "shadows/visibility_pair.h"
+
+namespace halfshade {
+
+/// The frame of a flat light, one side of it: z > 0 in front.
+struct LightFrame {
+  dvec3 origin{0.0}, u{1, 0, 0}, v{0, 1, 0}, n{0, 0, 1};
+  dvec3 to_frame(const dvec3& p) const {
+    const dvec3 d = p - origin;
+    return {glm::dot(d, u), glm::dot(d, v), glm::dot(d, n)};
+  }
+};
+
+struct BlockerTree {
+  static constexpr std::uint32_t kWidth = 16;
+  static constexpr std::uint32_t kLeafBit = 0x80000000u;
+
+  /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit.
+  struct alignas(64) Node {
+    float low[3][kWidth], high[3][kWidth];
+    std::uint32_t child[kWidth];
+    std::uint32_t count = 0;
+  };
+  /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
+  struct alignas(64) Leaf {
+    float corner[3][3][kWidth];  // [corner][axis][lane]
+    float seen[3][3][kWidth];    // [corner][axis][lane], the same in the light's frame
+    float normal[3][kWidth], side_error[kWidth], edge_error[3][kWidth];
+    std::uint32_t triangle[kWidth];
+    std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
+    std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0;
+    vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
+  };
+  std::vector<std::uint32_t> order;  // triangles, leaf by leaf
+  std::vector<Leaf> leaves;
+  std::vector<Node> nodes;           // children behind their parents; the root is the first; empty without triangles
+  std::vector<Blocker> blockers;     // [place in order], for the light of the last refit
+  std::vector<AlphaTriangle> alpha;  // of the perforated ones
+
+  std::size_t bytes() const;
+};
+
+/// Order, leaves and topology by binned surface area heuristic. Equal bits for any number of threads.
+void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);
+
+/// Blockers and bounds for a light.
+void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
+                        BlockerTree& tree);
+
+}  // namespace halfshade

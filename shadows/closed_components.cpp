@@ -1,0 +1,125 @@
+#include "shadows/closed_components.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "rasterizer/core/parallel.h"
+
+namespace halfshade {
+namespace {
+
+/// Equal positions get equal numbers.
+std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
+  std::vector<std::uint32_t> order(positions.size()), number(positions.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    const vec3 &p = positions[a], &q = positions[b];
+    return p.x != q.x ? p.x < q.x : (p.y != q.y ? p.y < q.y : p.z < q.z);
+  };
+  parallel_sort(order, before);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
+    number[order[i]] = same ? number[order[i - 1]] : static_cast<std::uint32_t>(i);
+  }
+  return number;
+}
+
+/// One use of an edge by a triangle.
+struct EdgeUse {
+  std::uint64_t edge;  // both ends, the lower number first
+  std::uint32_t triangle;
+  std::int32_t direction;  // +1 from the lower to the higher end
+};
+
+std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<std::uint32_t>& number) {
+  std::vector<EdgeUse> uses;
+  uses.reserve(mesh.triangles.size() * 3);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t a = number[mesh.triangles[t][k]], b = number[mesh.triangles[t][(k + 1) % 3]];
+      if (a == b) continue;
+      const std::uint64_t low = std::min(a, b), high = std::max(a, b);
+      uses.push_back({low << 32 | high, t, a < b ? 1 : -1});
+    }
+  }
+  parallel_sort(uses, [](const EdgeUse& a, const EdgeUse& b) {
+    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
+  });
+  return uses;
+}
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = find(a), b = find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+/// Calls run(uses of one edge) for each edge.
+template <class Run>
+void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
+  while (!uses.empty()) {
+    std::size_t count = 1;
+    while (count < uses.size() && uses[count].edge == uses[0].edge) ++count;
+    run(uses.first(count));
+    uses = uses.subspan(count);
+  }
+}
+
+}  // namespace
+
+ClosedComponents find_closed_components(const LatticeMesh& mesh) {
+  const std::size_t count = mesh.triangles.size();
+  const std::vector<EdgeUse> uses = collect_edges(mesh, weld(mesh.positions));
+  DisjointSets sets(count);
+  for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
+    for (const EdgeUse& use : edge) sets.join(edge[0].triangle, use.triangle);
+  });
+  std::vector<std::uint8_t> open(count, 0);  // [root]
+  for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
+    std::int32_t balance = 0;
+    for (const EdgeUse& use : edge) balance += use.direction;
+    if (balance != 0) open[sets.find(edge[0].triangle)] = 1;
+  });
+  for (std::uint32_t t = 0; t < count; ++t) {
+    if (mesh.alpha_map(t) != kNone) open[sets.find(t)] = 1;
+  }
+  ClosedComponents result;
+  result.of_triangle.assign(count, kNone);
+  std::vector<std::uint32_t> box_of_root(count, kNone);
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const std::uint32_t root = sets.find(t);
+    result.components += root == t;
+    if (open[root]) continue;
+    const auto corners = mesh.corners(t);
+    if (box_of_root[root] == kNone) {
+      box_of_root[root] = static_cast<std::uint32_t>(result.boxes.size());
+      result.boxes.push_back({corners[0], corners[0]});
+    }
+    result.of_triangle[t] = box_of_root[root];
+    ClosedComponents::Box& box = result.boxes[box_of_root[root]];
+    for (const vec3& p : corners) box = {glm::min(box.low, p), glm::max(box.high, p)};
+  }
+  return result;
+}
+
+void certify(const LatticeMesh& mesh, const ShadowConfig& config, ClosedComponents& closed, KernelSamples& samples,
+             ShadowStats& stats) {
+  if (!config.back_face_casters) return;
+  closed = find_closed_components(mesh);
+  use_certificate(closed, samples);
+  for (const std::uint32_t c : closed.of_triangle) {
+    stats.certified_blockers += c != kNone && samples.closed_usable[c] != 0;
+  }
+}
+
+}  // namespace halfshade

@@ -1,0 +1,196 @@
+#include "shadows/exact_engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "rasterizer/core/parallel.h"
+#include "rasterizer/core/stopwatch.h"
+#include "shadows/alias_free_shadow_map.h"
+#include "shadows/closed_components.h"
+#include "shadows/exact_kernel.h"
+#include "shadows/light_view.h"
+#include "shadows/solver.h"
+
+namespace halfshade {
+namespace {
+
+constexpr std::size_t kCluster = 64;  // receivers that share a list of leaves
+constexpr std::size_t kClustersPerTask = 8;
+
+/// 10 bits of x with two zero bits between each.
+std::uint32_t spread_bits(std::uint32_t x) {
+  x = (x | x << 16) & 0x030000ffu;
+  x = (x | x << 8) & 0x0300f00fu;
+  x = (x | x << 4) & 0x030c30c3u;
+  return (x | x << 2) & 0x09249249u;
+}
+
+/// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
+constexpr double kGrazing = 1e-5;
+
+/// Receivers in front of the light on its z > 0 side, in Morton order of their positions, so that runs are compact.
+std::vector<std::uint32_t> order_receivers(const ReceiverArray& receivers, const LightFrame& frame) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> keys;
+  keys.reserve(receivers.size());
+  vec3 low(2.0f), high(-2.0f);
+  for (const vec3& p : receivers.position) low = glm::min(low, p), high = glm::max(high, p);
+  const vec3 scale = 1023.0f / glm::max(high - low, vec3(1e-30f));
+  for (std::uint32_t i = 0; i < receivers.size(); ++i) {
+    if (!(frame.to_frame(dvec3(receivers.position[i])).z > kGrazing)) continue;
+    const vec3 q = (receivers.position[i] - low) * scale;
+    const std::uint32_t code = spread_bits(static_cast<std::uint32_t>(q.x)) |
+                               spread_bits(static_cast<std::uint32_t>(q.y)) << 1 |
+                               spread_bits(static_cast<std::uint32_t>(q.z)) << 2;
+    keys.emplace_back(code, i);
+  }
+  parallel_sort(keys, [](const auto& a, const auto& b) { return a < b; });
+  std::vector<std::uint32_t> order;
+  order.reserve(keys.size());
+  for (const auto& key : keys) order.push_back(key.second);
+  return order;
+}
+
+/// Bins over the bounding rectangle of all sets.
+void sort_into_bins(const KernelSamples& samples, const LightFrame& frame, SampleRectangles& r) {
+  constexpr std::uint32_t kBins = SampleRectangles::kBins;
+  dvec2 low(HUGE_VAL), high(-HUGE_VAL);
+  std::vector<dvec2> points;
+  for (const vec3& p : samples.points) {
+    points.emplace_back(frame.to_frame(dvec3(p)));
+    low = glm::min(low, points.back()), high = glm::max(high, points.back());
+  }
+  r.bins_low = vec2(low);
+  r.bins_per_unit = vec2(double{kBins} / glm::max(high - low, dvec2(1e-12)));
+  r.occupied.assign(samples.sets, {});
+  r.bin_of_sample.assign(points.size(), 0);
+  for (std::uint32_t set = 0; set < samples.sets; ++set) {
+    std::vector<std::vector<std::uint16_t>> bins(kBins * kBins);
+    for (std::uint32_t i = 0; i < samples.count; ++i) {
+      const std::size_t at = std::size_t{set} * samples.padded + i;
+      const dvec2 place = (points[at] - dvec2(r.bins_low)) * dvec2(r.bins_per_unit);
+      const auto column = static_cast<std::uint32_t>(std::clamp(place.x, 0.0, kBins - 1.0));
+      const auto row = static_cast<std::uint32_t>(std::clamp(place.y, 0.0, kBins - 1.0));
+      r.occupied[set][row] |= 1u << column;
+      r.bin_of_sample[at] = static_cast<std::uint16_t>(row * kBins + column);
+      bins[row * kBins + column].push_back(static_cast<std::uint16_t>(i));
+    }
+    for (const auto& bin : bins) {
+      r.bin_begin.push_back(static_cast<std::uint32_t>(r.binned.size()));
+      r.binned.insert(r.binned.end(), bin.begin(), bin.end());
+    }
+    r.bin_begin.push_back(static_cast<std::uint32_t>(r.binned.size()));
+  }
+}
+
+SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame& frame) {
+  SampleRectangles r;
+  const std::size_t count = samples.group_x.size(), groups = samples.padded / KernelSamples::kGroup;
+  r.low_u.assign(count, 0.0f), r.low_v.assign(count, 0.0f), r.high_u.assign(count, 0.0f), r.high_v.assign(count, 0.0f);
+  for (std::uint32_t set = 0; set < samples.sets; ++set) {
+    for (std::size_t g = 0; g < groups; ++g) {
+      dvec3 low(HUGE_VAL), high(-HUGE_VAL);
+      for (const vec3& p : samples.set_points(set).subspan(g * KernelSamples::kGroup, KernelSamples::kGroup)) {
+        const dvec3 q = frame.to_frame(dvec3(p));
+        low = glm::min(low, q), high = glm::max(high, q);
+      }
+      const std::size_t at = std::size_t{set} * samples.group_stride + g;
+      r.low_u[at] = static_cast<float>(low.x - 1e-7), r.high_u[at] = static_cast<float>(high.x + 1e-7);
+      r.low_v[at] = static_cast<float>(low.y - 1e-7), r.high_v[at] = static_cast<float>(high.y + 1e-7);
+      r.thickness = std::max({r.thickness, static_cast<float>(-low.z), static_cast<float>(high.z)});
+    }
+  }
+  r.thickness += 1e-7f;
+  sort_into_bins(samples, frame, r);
+  return r;
+}
+
+void add_counters(const std::vector<ExactScratch>& scratches, ShadowStats& stats) {
+  KernelCounters total;
+  for (const ExactScratch& s : scratches) {
+    total.add(s.counters);
+    stats.leaves_listed += s.leaves_listed;
+    stats.leaves_tested += s.leaves_tested;
+    stats.clusters_lit += s.clusters_lit;
+  }
+  add_to_stats(total, stats);
+}
+
+/// All receivers on one side of the light.
+void solve_side(const LatticeMesh& mesh, const ReceiverArray& receivers, const KernelSamples& samples,
+                const LightFrame& frame, const ShadowConfig& config, BlockerTree& tree, VisibilityMasks& masks,
+                ShadowStats& stats) {
+  Stopwatch watch;
+  const std::vector<std::uint32_t> order = order_receivers(receivers, frame);
+  if (order.empty()) return;
+  KernelReceivers kernel = gather_receivers(receivers, order, masks.words_per_receiver);
+  stats.index_ms += watch.lap();
+  refit_blocker_tree(mesh, samples, frame, tree);
+  const SampleRectangles rectangles = make_rectangles(samples, frame);
+  stats.cull_ms += watch.lap();
+  const ExactScene scene{&tree, &samples, &rectangles, frame};
+  constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
+  const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
+  std::vector<ExactScratch> scratches(kTasksPerRound);
+  for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
+    report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
+    parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
+      const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
+      for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
+        solve_cluster(scene, begin, std::min(task_end, begin + kCluster), kernel, scratches[t]);
+      }
+    });
+  }
+  scatter_masks(kernel, samples, order, masks);
+  add_counters(scratches, stats);
+  stats.bytes = std::max<std::uint64_t>(stats.bytes, tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
+  stats.test_ms += watch.lap();
+}
+
+void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                   const LightSamples& samples, const LightFrame& frame, const ShadowConfig& config,
+                   VisibilityMasks& masks, ShadowStats& stats) {
+  ReceiverArray grazing;
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < receivers.size(); ++i) {
+    if (!(std::fabs(frame.to_frame(dvec3(receivers.position[i])).z) <= kGrazing)) continue;
+    grazing.push_back(receivers.position[i], receivers.normal[i], receivers.triangle[i], receivers.sample[i],
+                      receivers.set[i]);
+    order.push_back(i);
+  }
+  if (order.empty()) return;
+  VisibilityMasks solved;
+  solve_alias_free_shadow_map(mesh, grazing, light, samples, config, solved, stats);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::span<const std::uint64_t> mask = solved.mask(i);
+    std::copy(mask.begin(), mask.end(), masks.words.begin() + order[i] * masks.words_per_receiver);
+  }
+}
+
+}  // namespace
+
+void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
+  if (!samples.flat) {
+    solve_alias_free_shadow_map(mesh, receivers, light, samples, config, masks, stats);
+    return;
+  }
+  Stopwatch watch;
+  masks.reset(receivers.size(), samples.count);
+  if (mesh.triangles.empty()) return;
+  const LightBound bound = make_light_bound(light, samples);
+  KernelSamples kernel_samples = make_kernel_samples(samples, bound);
+  ClosedComponents closed;
+  certify(mesh, config, closed, kernel_samples, stats);
+  BlockerTree tree;
+  build_blocker_tree(mesh, tree);
+  stats.build_ms += watch.lap();
+  const LightFrame front{dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
+  solve_side(mesh, receivers, kernel_samples, front, config, tree, masks, stats);
+  solve_grazing(mesh, receivers, light, samples, front, config, masks, stats);
+  if (samples.one_sided) return;
+  const LightFrame back{front.origin, front.u, front.v, -front.n};
+  solve_side(mesh, receivers, kernel_samples, back, config, tree, masks, stats);
+}
+
+}  // namespace halfshade

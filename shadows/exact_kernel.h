@@ -1,0 +1,41 @@
+// Hot loop of the exact engine: one cluster of receivers against a tree of blockers.
+#pragma once
+
+#include "shadows/blocker_tree.h"
+
+namespace halfshade {
+
+/// The samples seen from the front: groups as rectangles in the light's plane, [set][KernelSamples::group_stride],
+/// padded outwards; and all samples sorted into 32 x 32 bins.
+struct SampleRectangles {
+  static constexpr std::uint32_t kBins = 32;
+  std::vector<float> low_u, low_v, high_u, high_v;
+  float thickness = 0.0f;  // the samples lie within this distance of the plane
+  vec2 bins_low{0.0f}, bins_per_unit{0.0f};
+  std::vector<std::array<std::uint32_t, kBins>> occupied;  // [set][row]: bit c is set where bin (row, c) holds a sample
+  std::vector<std::uint16_t> bin_of_sample;                // [set][KernelSamples::padded], row * 32 + column
+  std::vector<std::uint32_t> bin_begin;                    // [set][bin + 1] into binned
+  std::vector<std::uint16_t> binned;                       // samples (kernel order), bin by bin
+};
+
+struct ExactScene {
+  const BlockerTree* tree = nullptr;
+  const KernelSamples* samples = nullptr;
+  const SampleRectangles* rectangles = nullptr;
+  LightFrame frame;
+};
+
+/// Scratch of one thread, and what it counted.
+struct ExactScratch {
+  std::vector<std::uint32_t> stack, leaf;             // node stack; collected leaves
+  std::vector<float> low[3], high[3];                 // their boxes, light frame, padded to full vectors
+  std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
+  KernelCounters counters;
+  std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0;
+};
+
+/// Solves receivers [begin, end), which should lie near each other. All in front of the light (z > 0 in its frame).
+void solve_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+                   ExactScratch& scratch);
+
+}  // namespace halfshade

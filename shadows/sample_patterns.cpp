@@ -1,0 +1,193 @@
+#include "shadows/sample_patterns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rasterizer/core/hash.h"
+
+namespace halfshade {
+namespace {
+
+/// Rows of the cell grid: the exact grid with rows <= columns <= 2 rows where the count has one, else
+/// floor(sqrt(count)) rows whose numbers of columns differ by at most one; each sample stands for the same area either
+/// way.
+std::uint32_t row_count(std::uint32_t count) {
+  auto root = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(count)));
+  while (root * root > count) --root;
+  for (std::uint32_t rows = root; rows >= 1 && count <= 2 * rows * rows; --rows) {
+    if (count % rows == 0) return rows;
+  }
+  return root;
+}
+
+double fraction(double x) { return x - std::floor(x); }
+
+/// Shift of row `row` as a fraction of a column: a rank-1 lattice whose generator is coprime to the number of rows and
+/// near the golden section of it, so that neighbouring rows are spread well.
+double row_shift(std::uint32_t row, std::uint32_t rows) {
+  auto gcd = [](std::uint32_t a, std::uint32_t b) {
+    while (b != 0) a = std::exchange(b, a % b);
+    return a;
+  };
+  auto generator = static_cast<std::uint32_t>(rows * 0.6180339887498949 + 0.5);
+  while (generator > 1 && gcd(generator, rows) != 1) --generator;
+  return (static_cast<double>((std::uint64_t{row} * generator) % rows) + 0.5) / rows;
+}
+
+std::uint32_t reversed_bits(std::uint32_t x) {
+  x = (x >> 16) | (x << 16);
+  x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
+  x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
+  x = ((x & 0x33333333u) << 2) | ((x & 0xccccccccu) >> 2);
+  return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
+}
+
+/// Second dimension of the Sobol' sequence (the first is reversed_bits): direction numbers of Pascal's triangle mod 2.
+std::uint32_t sobol_second(std::uint32_t index) {
+  std::uint32_t result = 0;
+  for (std::uint32_t direction = 1u << 31; index != 0; index >>= 1, direction ^= direction >> 1) {
+    if (index & 1) result ^= direction;
+  }
+  return result;
+}
+
+/// Offset of a set on the torus. Sets after the first come in pairs, p and -p, so that the mean offset stays near zero;
+/// p follows the (0,2)-sequence in one half of the cell, so that the sets refine it evenly in both directions and along
+/// each axis by itself; the third keeps the heights of -p off those of p. (Additive sequences such as Roberts' R2 stay
+/// uneven along the axes for fifty sets: 0.75488 is nearly 3/4.)
+dvec2 shifted(const dvec2& st, std::uint32_t set) {
+  if (set == 0) return st;
+  const std::uint32_t pair = set / 2 + set % 2;
+  const dvec2 p(reversed_bits(pair) * 0x1p-33, fraction(sobol_second(pair) * 0x1p-32 + 1.0 / 3.0) - 0.5);
+  const dvec2 moved = set % 2 == 1 ? st + p : st - p;
+  return {fraction(moved.x), fraction(moved.y)};
+}
+
+/// The patterns on a grid of cells: sample `index` lies in its own cell.
+dvec2 cell_sample(SamplePattern pattern, std::uint32_t index, std::uint32_t count, std::uint32_t rows,
+                  std::uint32_t set, std::uint32_t seed) {
+  const auto row = static_cast<std::uint32_t>((std::uint64_t{index} * rows + rows - 1) / count);
+  const auto first = static_cast<std::uint32_t>(std::uint64_t{row} * count / rows);
+  const std::uint32_t columns = static_cast<std::uint32_t>(std::uint64_t{row + 1} * count / rows) - first;
+  dvec2 st(0.5, 0.5);
+  if (pattern == SamplePattern::kStratified) {
+    st = {hash_unit(index, hash32(seed, 2 * set)), hash_unit(index, hash32(seed, 2 * set + 1))};
+  } else {
+    if (pattern == SamplePattern::kRows) st.x = row_shift(row, rows);
+    st = shifted(st, set);
+  }
+  return {(index - first + st.x) / columns, (first + st.y * columns) / count};
+}
+
+/// Owen's nested scrambling by a hash (Laine and Karras 2011; constants of Vegdahl 2021): on reversed bits, each step
+/// changes a bit by a function of lower ones only, so elementary intervals are exchanged whole.
+std::uint32_t scrambled(std::uint32_t x, std::uint32_t seed) {
+  x = reversed_bits(x);
+  x ^= x * 0x3d20adeau;
+  x += seed;
+  x *= (seed >> 16) | 1;
+  x ^= x * 0x05526c56u;
+  x ^= x * 0x53a22864u;
+  return reversed_bits(x);
+}
+
+dvec2 low_discrepancy_sample(std::uint32_t index, std::uint32_t set, std::uint32_t seed) {
+  return {scrambled(reversed_bits(index), hash32(seed, 2 * set)) * 0x1p-32,
+          scrambled(sobol_second(index), hash32(seed, 2 * set + 1)) * 0x1p-32};
+}
+
+/// Points on the torus, sorted into cells for the question whether one lies nearer than a radius.
+class TorusPoints {
+ public:
+  explicit TorusPoints(std::uint32_t count) {
+    while (cells_ * cells_ < count) cells_ *= 2;
+    heads_.assign(std::size_t{cells_} * cells_, kNone);
+  }
+
+  void add(const dvec2& p) {
+    std::uint32_t& head = heads_[cell(p.y) * cells_ + cell(p.x)];
+    next_.push_back(std::exchange(head, static_cast<std::uint32_t>(points.size())));
+    points.push_back(p);
+  }
+
+  bool any_within(const dvec2& p, double radius) const {
+    const auto reach = static_cast<std::uint32_t>(radius * cells_) + 1;
+    if (2 * reach + 1 >= cells_) {
+      return std::any_of(points.begin(), points.end(), [&](const dvec2& q) { return near(p, q, radius); });
+    }
+    for (std::uint32_t y = cell(p.y) + cells_ - reach, y_end = y + 2 * reach; y <= y_end; ++y) {
+      for (std::uint32_t x = cell(p.x) + cells_ - reach, x_end = x + 2 * reach; x <= x_end; ++x) {
+        for (std::uint32_t i = heads_[y % cells_ * cells_ + x % cells_]; i != kNone; i = next_[i]) {
+          if (near(p, points[i], radius)) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  std::vector<dvec2> points;
+
+ private:
+  std::uint32_t cell(double x) const { return static_cast<std::uint32_t>(x * cells_); }
+  static bool near(const dvec2& p, const dvec2& q, double radius) {
+    const dvec2 d = glm::abs(p - q), torus = glm::min(d, 1.0 - d);
+    return glm::dot(torus, torus) < radius * radius;
+  }
+
+  std::uint32_t cells_ = 1;
+  std::vector<std::uint32_t> heads_, next_;  // linked lists per cell
+};
+
+/// Dart throwing with a radius that shrinks while it stays unsuccessful (McCool and Fiume 1992): any first part of the
+/// sequence is a Poisson disk pattern by itself.
+std::vector<dvec2> poisson_disk_sequence(std::uint32_t count, std::uint32_t seed) {
+  constexpr std::uint32_t kMost = 4096;  // the cells do not matter for the points, only for the time
+  constexpr double kShrink = 0.995, kFirst = 0.95;
+  constexpr std::uint32_t kPatience = 400;  // darts per radius
+  TorusPoints torus(std::min(count, kMost));
+  double factor = kFirst;
+  std::uint32_t dart = 0, misses = 0;
+  while (torus.points.size() < count) {
+    const double densest = std::sqrt(1.1547005383792517 / static_cast<double>(torus.points.size() + 1));
+    const dvec2 p(hash_unit(dart, hash32(seed, 0x9015501u)), hash_unit(dart, hash32(seed, 0xd15cu)));
+    ++dart;
+    if (!torus.any_within(p, factor * densest)) {
+      torus.add(p);
+      factor = std::min(kFirst, factor * 1.005), misses = 0;
+    } else if (++misses % kPatience == 0) {
+      factor *= kShrink;
+    }
+  }
+  return torus.points;
+}
+
+std::vector<dvec2> poisson_disk_samples(std::uint32_t count, std::uint32_t first_set, std::uint32_t sets,
+                                        std::uint32_t seed) {
+  const std::vector<dvec2> sequence = poisson_disk_sequence(count, seed);
+  std::vector<dvec2> result;
+  result.reserve(std::size_t{count} * sets);
+  for (std::uint32_t set = first_set; set < first_set + sets; ++set) {
+    for (const dvec2& st : sequence) result.push_back(shifted(st, set));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<dvec2> unit_square_samples(SamplePattern pattern, std::uint32_t count, std::uint32_t first_set,
+                                       std::uint32_t sets, std::uint32_t seed) {
+  if (pattern == SamplePattern::kPoissonDisk) return poisson_disk_samples(count, first_set, sets, seed);
+  const std::uint32_t rows = row_count(count);
+  std::vector<dvec2> result;
+  result.reserve(std::size_t{count} * sets);
+  for (std::uint32_t set = first_set; set < first_set + sets; ++set) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      result.push_back(pattern == SamplePattern::kLowDiscrepancy ? low_discrepancy_sample(i, set, seed)
+                                                                 : cell_sample(pattern, i, count, rows, set, seed));
+    }
+  }
+  return result;
+}
+
+}  // namespace halfshade
