@@ -17,9 +17,11 @@ struct Named {
 
 constexpr Named<ShadowMethod> kMethods[] = {
     {ShadowMethod::kAliasFreeShadowMap, "afsm"}, {ShadowMethod::kExact, "exact"}, {ShadowMethod::kOracle, "oracle"}};
-constexpr Named<SamplePattern> kPatterns[] = {
-    {SamplePattern::kRows, "rows"}, {SamplePattern::kUniform, "uniform"}, {SamplePattern::kStratified, "stratified"},
-    {SamplePattern::kLowDiscrepancy, "low-discrepancy"}, {SamplePattern::kPoissonDisk, "poisson-disk"}};
+constexpr Named<SamplePattern> kPatterns[] = {{SamplePattern::kRows, "rows"},
+                                              {SamplePattern::kUniform, "uniform"},
+                                              {SamplePattern::kStratified, "stratified"},
+                                              {SamplePattern::kLowDiscrepancy, "low-discrepancy"},
+                                              {SamplePattern::kPoissonDisk, "poisson-disk"}};
 
 template <class Value, std::size_t n>
 Value value_of(const Named<Value> (&table)[n], const std::string& name, const char* what) {
@@ -98,8 +100,7 @@ void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, cons
     if (behind) {
       unlit.push_back(i);
     } else {
-      const std::uint32_t set =
-          samples.interleaved ? i % kInterleavedSets : receiver_set(i, config.seed, samples.sets);
+      const std::uint32_t set = samples.interleaved ? i % kInterleavedSets : receiver_set(i, config.seed, samples.sets);
       array.push_back(position, vec3(0.0f), receivers[i].triangle, i, static_cast<std::uint8_t>(set));
     }
   }

@@ -17,9 +17,9 @@ enum class ShadowMethod {
 };
 
 enum class SamplePattern {
-  kRows,        // rows of equal height share v, each row shifted by its own lattice offset
-  kUniform,     // cell centres
-  kStratified,  // one jittered sample per cell
+  kRows,            // rows of equal height share v, each row shifted by its own lattice offset
+  kUniform,         // cell centres
+  kStratified,      // one jittered sample per cell
   kLowDiscrepancy,  // scrambled (0,2)-sequence; nested: the first samples of a larger number are those of a smaller one
   kPoissonDisk,     // no two samples near each other (measured on the torus); nested as well
 };
@@ -34,11 +34,11 @@ struct ShadowConfig {
   /// Heidrich 2001; Forest, Barthe, Paulin 2009, figure 5); by number mod 16 for explicit receivers. sample_sets counts
   /// for nothing then.
   bool interleave = false;
-  bool rotate_sets = false;       // disk and sphere lights: the sets are rotated copies of a single one
-  std::uint32_t seed = 0;         // same seed, same bits, on every platform
+  bool rotate_sets = false;  // disk and sphere lights: the sets are rotated copies of a single one
+  std::uint32_t seed = 0;    // same seed, same bits, on every platform
   std::uint32_t grid_resolution =
       0;  // afsm: cells per axis of the light view, 16..2048; 0 = chosen from the number of receivers
-  bool back_face_casters = true;                // afsm: skip front faces of meshes certified closed; changes no bit
+  bool back_face_casters = true;  // afsm: skip front faces of meshes certified closed; changes no bit
   /// Called now and then on the calling thread with the share done, 0..1; returning false stops the work: the call
   /// throws Error{kCancelled} and everything may be used again. May be empty.
   std::function<bool(double done)> progress = nullptr;
@@ -72,7 +72,7 @@ struct VisibilityMasks {
 
 /// Counters and times of one solve. Milliseconds are wall time.
 struct ShadowStats {
-  double build_ms = 0.0;    // what a static scene keeps: certificates, tree
+  double build_ms = 0.0;  // what a static scene keeps: certificates, tree
   double index_ms = 0.0;  // receivers into the light view's lists
   double cull_ms = 0.0;   // influence regions of the blockers
   double test_ms = 0.0;   // blockers against receivers and samples
@@ -83,11 +83,11 @@ struct ShadowStats {
   std::uint64_t sample_tests = 0;                       // (blocker, receiver, sample) tests by the float filter
   std::uint64_t exact_fallbacks = 0;                    // of these, handed to the exact predicate
   std::uint64_t lists_occupied = 0, lists_longest = 0;  // light-view cells with receivers; most receivers in one
-  std::uint64_t certified_blockers = 0;                 // triangles of closed meshes that cast by their back faces alone
-  std::uint64_t leaves_listed = 0, leaves_tested = 0;   // exact: per cluster; per receiver
-  std::uint64_t clusters_lit = 0;                       // exact: clusters proved lit by an empty list
-  std::uint64_t everywhere_blockers = 0;                // triangles without a bounded influence region
-  std::uint64_t bytes = 0;                              // working memory of the method, without masks
+  std::uint64_t certified_blockers = 0;                // triangles of closed meshes that cast by their back faces alone
+  std::uint64_t leaves_listed = 0, leaves_tested = 0;  // exact: per cluster; per receiver
+  std::uint64_t clusters_lit = 0;                      // exact: clusters proved lit by an empty list
+  std::uint64_t everywhere_blockers = 0;               // triangles without a bounded influence region
+  std::uint64_t bytes = 0;                             // working memory of the method, without masks
 };
 
 /// A surface point that asks for the light.

@@ -19,6 +19,7 @@ namespace {
 
 struct Outcome {
   std::uint64_t receivers = 0, checked = 0, blocked = 0, wrong = 0;
+  bool methods_agree = true;  // on the masks of all receivers
 };
 
 /// Renders the view's first light and checks one receiver in `every` with the oracle.
@@ -37,6 +38,12 @@ Outcome check_scene(const Scene& scene, const View& view, std::uint32_t size, st
   ShadowStats stats;
   solve_masks(mesh, receivers, light, light_samples, config, masks, stats);
   Outcome outcome;
+  for (const ShadowMethod method : exact_methods()) {
+    VisibilityMasks other;
+    config.method = method;
+    solve_masks(mesh, receivers, light, light_samples, config, other, stats);
+    outcome.methods_agree = outcome.methods_agree && other.words == masks.words;
+  }
   outcome.receivers = receivers.size();
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     if (hash32(static_cast<std::uint32_t>(i), 1) % every != 0) continue;
@@ -63,6 +70,7 @@ TEST_CASE("built-in scenes: masks equal the oracle") {
     CHECK(outcome.blocked > 0);
     CHECK(outcome.blocked < outcome.checked * 64);
     CHECK(outcome.wrong == 0);
+    CHECK(outcome.methods_agree);
   }
 }
 
@@ -82,5 +90,6 @@ TEST_CASE("shared scenes: masks of one receiver in a hundred equal the oracle") 
     CHECK(outcome.checked > 10);
     CHECK(outcome.blocked > 0);
     CHECK(outcome.wrong == 0);
+    CHECK(outcome.methods_agree);
   }
 }

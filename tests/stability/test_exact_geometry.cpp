@@ -161,7 +161,7 @@ std::uint32_t half_plane_count(double x) {
 
 TEST_CASE("S03 halfplane_exact: the number of blocked samples is the closed form, ties included") {
   const std::vector<dvec3> points = half_plane_receivers();
-  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
+  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kExact, ShadowMethod::kOracle}) {
     const VisibilityMasks masks =
         solve(scene_of(half_plane()), receivers_at(points), frame_light(), frame_config(), method);
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -174,7 +174,7 @@ TEST_CASE("S03 halfplane_exact: the number of blocked samples is the closed form
 TEST_CASE("S04 split_quad: two quads that meet leave no gap") {
   const Scene scene = scene_of(joined(half_plane(), quad({0, 2, -64}, {64, 2, -64}, {64, 2, 64}, {0, 2, 64})));
   const std::vector<dvec3> points = half_plane_receivers();
-  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
+  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kExact, ShadowMethod::kOracle}) {
     const VisibilityMasks masks = solve(scene, receivers_at(points), frame_light(), frame_config(), method);
     for (std::size_t i = 0; i < points.size(); ++i) CHECK(masks.visibility(i) == 0.0f);
   }

@@ -156,7 +156,7 @@ TEST_CASE("S11 light_in_triangle: coplanar triangles block nothing, piercing one
 
 TEST_CASE("S12 receiver_behind_light: receivers at and behind a one-sided light see nothing of it") {
   const std::vector<dvec3> points = {{0, 5, 0}, {3, 4, 0}, {0, 4, 0}};
-  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
+  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kExact, ShadowMethod::kOracle}) {
     const VisibilityMasks masks =
         solve(scene_of(plate(2)), receivers_at(points), frame_light(), frame_config(), method);
     for (std::size_t i = 0; i < points.size(); ++i) CHECK(masks.visibility(i) == 0.0f);
@@ -247,7 +247,7 @@ TEST_CASE("S17 N_sweep: any number of samples from 1 to 4096") {
 
 TEST_CASE("S18 both_sides_lit: a triangle whose plane holds the light's centre shadows both sides alike") {
   const std::vector<Triangle> t = {{dvec3(0, 1, -1), dvec3(0, 1, 1), dvec3(0, 3, 0)}};
-  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kOracle}) {
+  for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kExact, ShadowMethod::kOracle}) {
     const VisibilityMasks masks =
         solve(scene_of(t), receivers_at({{0.5, 0, 0}, {-0.5, 0, 0}}), frame_light(), frame_config(), method);
     CHECK(masks.blocked_count(0) == 88);
@@ -338,12 +338,12 @@ TEST_CASE("S29 isa_threads: masks do not depend on instruction set, threads or t
     for_each_simd_target([&](const std::string& target) {
       targets.push_back(target);
       for (const int threads : {1, 2, 3, 7}) {
-        VisibilityMasks masks;
-        tbb::task_arena(threads).execute([&] {
-          masks = solve(scene_of(triangles), receivers_at(points), frame_light(), frame_config(),
-                        ShadowMethod::kAliasFreeShadowMap);
-        });
-        hashes.push_back(masks.hash());
+        for (const ShadowMethod method : exact_methods()) {
+          VisibilityMasks masks;
+          tbb::task_arena(threads).execute(
+              [&] { masks = solve(scene_of(triangles), receivers_at(points), frame_light(), frame_config(), method); });
+          hashes.push_back(masks.hash());
+        }
       }
     });
     std::shuffle(triangles.begin(), triangles.end(), random.engine);

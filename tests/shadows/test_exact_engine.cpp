@@ -1,0 +1,95 @@
+#include <doctest/doctest.h>
+
+#include <algorithm>
+
+#include "shadows/blocker_tree.h"
+#include "shadows/light_view.h"
+#include "support/lit_scene.h"
+
+using namespace halfshade;
+using namespace halfshade::test;
+
+namespace {
+
+std::vector<Triangle> random_triangles(std::uint64_t seed, int count) {
+  Random random(seed);
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < count; ++i) {
+    const dvec3 c = random.in_box(-4, 3.5);
+    const double size = i % 10 == 0 ? 2.0 : 0.2;
+    triangles.push_back(
+        {c + size * random.in_box(-1, 1), c + size * random.in_box(-1, 1), c + size * random.in_box(-1, 1)});
+  }
+  return triangles;
+}
+
+}  // namespace
+
+TEST_CASE("the blocker tree holds every triangle once, in full leaves, inside the boxes above it") {
+  for (const int count : {1, 15, 16, 17, 300, 5000}) {
+    CAPTURE(count);
+    const Scene scene = scene_of(random_triangles(1, count));
+    const Light light = frame_light();
+    const LatticeMesh mesh = make_lattice_mesh(scene, make_local_frame(scene.positions, light_extent(light)));
+    const LightSamples samples = make_light_samples(light, frame_config(16), mesh.frame);
+    const LightBound bound = make_light_bound(light, samples);
+    const LightFrame frame{dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
+    BlockerTree tree;
+    build_blocker_tree(mesh, tree);
+    refit_blocker_tree(mesh, make_kernel_samples(samples, bound), frame, tree);
+    std::vector<std::uint32_t> order = tree.order;
+    std::sort(order.begin(), order.end());
+    REQUIRE(order.size() == static_cast<std::size_t>(count));
+    for (std::uint32_t t = 0; t < order.size(); ++t) REQUIRE(order[t] == t);
+    CHECK(tree.leaves.size() <= static_cast<std::size_t>(count) / 6 + 1);
+    std::size_t reached = 0;
+    for (const BlockerTree::Node& node : tree.nodes) {
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        if ((node.child[i] & BlockerTree::kLeafBit) == 0) continue;
+        const BlockerTree::Leaf& leaf = tree.leaves[node.child[i] & ~BlockerTree::kLeafBit];
+        reached += leaf.count;
+        for (std::uint32_t lane = 0; lane < leaf.count; ++lane) {
+          for (const vec3& p : mesh.corners(leaf.triangle[lane])) {
+            const dvec3 q = frame.to_frame(dvec3(p));
+            for (int axis = 0; axis < 3; ++axis) {
+              REQUIRE(q[axis] >= node.low[axis][i]);
+              REQUIRE(q[axis] <= node.high[axis][i]);
+            }
+          }
+        }
+      }
+    }
+    CHECK(reached == static_cast<std::size_t>(count));
+  }
+}
+
+TEST_CASE("the tree culls: few leaves are tested per receiver") {
+  const Scene scene = scene_of(random_triangles(2, 20000));
+  std::vector<dvec3> points;
+  Random random(3);
+  for (int i = 0; i < 2000; ++i) points.push_back({random.uniform(-4, 4), -4.5, random.uniform(-4, 4)});
+  ShadowStats stats;
+  Light small = frame_light();
+  small.u *= 0.1, small.v *= 0.1;
+  solve(scene, receivers_at(points), small, frame_config(64), ShadowMethod::kExact, &stats);
+  CHECK(stats.leaves_tested > 0);
+  CHECK(stats.leaves_tested < 2000 * 100);  // of about 1,700 leaves
+}
+
+TEST_CASE("receivers in and near the light's plane, and light samples of many sets, give the oracle's bits") {
+  Random random(4);
+  std::vector<dvec3> points;
+  for (int i = 0; i < 400; ++i) {
+    const double height = i % 4 == 0 ? 0.0 : std::exp2(-random.uniform(0.0, 24.0));
+    points.push_back({random.uniform(-4, 4), 4.0 + (i % 2 == 0 ? height : -height), random.uniform(-4, 4)});
+  }
+  Light light = frame_light();
+  light.two_sided = true;
+  ShadowConfig config = frame_config(100);
+  config.sample_sets = 5;
+  config.pattern = SamplePattern::kStratified;
+  CHECK(wrong_bits_of_exact_methods(scene_of(random_triangles(5, 300)), receivers_at(points), light, config) == 0);
+  light.shape = LightShape::kDisk;
+  light.radius = 1.5;
+  CHECK(wrong_bits_of_exact_methods(scene_of(random_triangles(6, 300)), receivers_at(points), light, config) == 0);
+}
