@@ -27,8 +27,7 @@ constexpr std::uint32_t kReferenceFrame = 1u << 24;  // the reference's sets: fa
 constexpr std::uint32_t kReferenceSetSize = 256;
 constexpr std::uint32_t kMostReferenceSamples = 1u << 22;
 constexpr std::size_t kFewestFitted = 4;
-constexpr double kTrust =
-    3.0;  // below this many of the reference's own errors, an error tells little about convergence
+constexpr double kTrust = 3.0;  // errors below this many of the reference's own tell little
 
 struct AccumulateOptions : PipelineOptions {
   std::string output, json;
