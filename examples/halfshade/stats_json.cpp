@@ -59,6 +59,9 @@ nlohmann::ordered_json stats_json(const ShadowStats& s) {
           {"lists_occupied", s.lists_occupied},
           {"lists_longest", s.lists_longest},
           {"certified_blockers", s.certified_blockers},
+          {"leaves_listed", s.leaves_listed},
+          {"leaves_tested", s.leaves_tested},
+          {"clusters_lit", s.clusters_lit},
           {"everywhere_blockers", s.everywhere_blockers},
           {"bytes", s.bytes}};
 }
