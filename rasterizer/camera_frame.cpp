@@ -11,8 +11,6 @@ namespace {
 // Up and view direction closer than this (sine of the angle) leave the picture's rotation to rounding errors.
 constexpr double kMinSineOfUp = 1e-9;
 
-bool is_finite(const dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
 // Unit vector, or zero for a zero vector. Scaling by the largest component first keeps the squares in range.
 dvec3 unit_or_zero(const dvec3& v) {
   const double largest = std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});

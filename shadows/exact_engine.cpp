@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
@@ -97,6 +96,8 @@ SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame&
       const std::size_t at = std::size_t{set} * samples.group_stride + g;
       r.low_u[at] = static_cast<float>(low.x - 1e-7), r.high_u[at] = static_cast<float>(high.x + 1e-7);
       r.low_v[at] = static_cast<float>(low.y - 1e-7), r.high_v[at] = static_cast<float>(high.y + 1e-7);
+      r.whole_low = glm::min(r.whole_low, vec2(r.low_u[at], r.low_v[at]));
+      r.whole_high = glm::max(r.whole_high, vec2(r.high_u[at], r.high_v[at]));
       r.thickness = std::max({r.thickness, static_cast<float>(-low.z), static_cast<float>(high.z)});
     }
   }

@@ -403,14 +403,9 @@ void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, K
     for (int k = 0; k < 3; ++k)
       shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
   }
-  const KernelSamples& samples = *scene.samples;
-  const std::vector<std::uint64_t> nothing(receivers.words, 0);
-  for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    const Rectangle whole = OpenRectangle(scene, set, nothing.data(), receivers.words);
-    const float pad = ProjectionPad(shaft.low[2]);
-    shaft.light = {std::min(shaft.light.low_u, whole.low_u - pad), std::min(shaft.light.low_v, whole.low_v - pad),
-                   std::max(shaft.light.high_u, whole.high_u + pad), std::max(shaft.light.high_v, whole.high_v + pad)};
-  }
+  const vec2 low = scene.rectangles->whole_low, high = scene.rectangles->whole_high;
+  const float pad = ProjectionPad(shaft.low[2]);
+  shaft.light = {low.x - pad, low.y - pad, high.x + pad, high.y + pad};
   CollectLeaves(*scene.tree, shaft, scratch);
   scratch.leaves_listed += scratch.leaf.size();
   if (scratch.leaf.empty()) {

@@ -10,7 +10,8 @@ namespace halfshade {
 struct SampleRectangles {
   static constexpr std::uint32_t kBins = 32;
   std::vector<float> low_u, low_v, high_u, high_v;
-  float thickness = 0.0f;  // the samples lie within this distance of the plane
+  vec2 whole_low{1e30f}, whole_high{-1e30f};  // around all groups of all sets
+  float thickness = 0.0f;                     // the samples lie within this distance of the plane
   vec2 bins_low{0.0f}, bins_per_unit{0.0f};
   std::vector<std::array<std::uint32_t, kBins>> occupied;  // [set][row]: bit c is set where bin (row, c) holds a sample
   std::vector<std::uint16_t> bin_of_sample;                // [set][KernelSamples::padded], row * 32 + column

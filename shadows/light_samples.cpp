@@ -36,8 +36,6 @@ void require(bool condition, const Light& light, const char* what) {
   if (!condition) throw Error(ErrorCode::kBadInput, "light '" + light.name + "': " + what);
 }
 
-bool finite(const dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
 void check(const Light& light, const ShadowConfig& config) {
   if (config.light_sample_count < 1 || config.light_sample_count > 4096) {
     throw Error(ErrorCode::kUsage,
@@ -50,11 +48,11 @@ void check(const Light& light, const ShadowConfig& config) {
     throw Error(ErrorCode::kUsage,
                 "frame: " + std::to_string(config.frame) + " is not below " + std::to_string(kMaxFrames));
   }
-  require(
-      finite(light.center) && finite(light.u) && finite(light.v) && finite(light.normal) && std::isfinite(light.radius),
-      light, "a coordinate is not finite");
+  require(is_finite(light.center) && is_finite(light.u) && is_finite(light.v) && is_finite(light.normal) &&
+              std::isfinite(light.radius),
+          light, "a coordinate is not finite");
   require(light.radius >= 0.0, light, "the radius is negative");
-  require(std::all_of(light.axes.begin(), light.axes.end(), finite), light, "a coordinate is not finite");
+  require(std::all_of(light.axes.begin(), light.axes.end(), is_finite), light, "a coordinate is not finite");
   require(light.shape != LightShape::kDisk || glm::length(light.normal) > 0.0, light, "the normal is zero");
   if (light.shape == LightShape::kSamples) {
     require(!light.points.empty(), light, "there are no sample points");
@@ -62,7 +60,7 @@ void check(const Light& light, const ShadowConfig& config) {
       throw Error(ErrorCode::kUsage, "light '" + light.name + "': " + std::to_string(light.points.size()) +
                                          " sample points, 1..4096 are allowed");
     }
-    require(std::all_of(light.points.begin(), light.points.end(), finite), light, "a sample point is not finite");
+    require(std::all_of(light.points.begin(), light.points.end(), is_finite), light, "a sample point is not finite");
   }
 }
 

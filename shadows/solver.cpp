@@ -43,8 +43,7 @@ const char* name_in(const Named<Value> (&table)[n], Value value) {
 
 void check_finite(std::span<const Receiver> receivers) {
   for (std::size_t i = 0; i < receivers.size(); ++i) {
-    const dvec3& p = receivers[i].position_world;
-    if (!std::isfinite(p.x + p.y + p.z)) {
+    if (!is_finite(receivers[i].position_world)) {
       throw Error(ErrorCode::kBadInput, "receiver " + std::to_string(i) + ": the position is not finite");
     }
   }

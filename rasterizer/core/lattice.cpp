@@ -9,14 +9,12 @@ namespace {
 
 double max_abs(const dvec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
 
-bool finite(const dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
 }  // namespace
 
 LocalFrame make_local_frame(std::span<const dvec3> geometry, std::span<const dvec3> extra) {
   for (const std::span<const dvec3> points : {geometry, extra}) {
     for (const dvec3& p : points) {
-      if (!finite(p)) throw Error(ErrorCode::kBadInput, "a position is not finite");
+      if (!is_finite(p)) throw Error(ErrorCode::kBadInput, "a position is not finite");
     }
   }
   const std::span<const dvec3> boxed = geometry.empty() ? extra : geometry;

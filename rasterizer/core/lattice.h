@@ -29,6 +29,8 @@ inline vec3 snap_to_lattice(const dvec3& p) {
   return {snap_to_lattice(p.x), snap_to_lattice(p.y), snap_to_lattice(p.z)};
 }
 
+inline bool is_finite(const dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
 /// World <-> local. Built from the scene's box and the farthest point that must fit (lights, explicit receivers).
 /// Subtracting the box minimum first makes the frame independent of where the scene lies: fl(p - min) is the same
 /// double for a shifted copy of the scene whenever the shifted coordinates are exact.
