@@ -6,18 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <filesystem>
-#include <numeric>
 #include <thread>
 
+#include "bench_case.h"
 #include "examples/halfshade/scene_source.h"
 #include "harness.h"
-#include "rasterizer/core/hash.h"
-#include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
-#include "rasterizer/rasterizer.h"
 #include "rivals/embree_rays.h"
-#include "shadows/oracle.h"
 #include "shadows/solver.h"
 
 namespace halfshade::bench {
@@ -32,22 +28,6 @@ struct Options {
   std::uint32_t light_samples = 256, sets = 1, seed = 0;
   int threads = 0, repeat = 5;
   double verify_percent = 1.0, verify_seconds = 10.0;
-};
-
-/// One row of work: a scene, one of its lights at one size, the receivers of one picture.
-struct Case {
-  std::string scene, light_name;
-  double light_percent = 0.0;  // the light's diagonal in percent of the scene box's
-  Light light;
-  LatticeMesh mesh;
-  GBuffer gbuffer;
-  LightSamples samples;
-  ReceiverArray receivers;
-  std::vector<std::uint32_t> order;  // receivers by 4x4-pixel tile
-};
-
-struct OracleCheck {
-  std::uint64_t receivers = 0, wrong_bits = 0;
 };
 
 struct MethodResult {
@@ -72,96 +52,17 @@ struct Row {
   std::string method;
 };
 
-double light_diagonal(const Light& light) {
-  switch (light.shape) {
-    case LightShape::kRectangle:
-      return std::sqrt(glm::dot(light.u, light.u) + glm::dot(light.v, light.v));
-    case LightShape::kDisk:
-    case LightShape::kSphere:
-      return 2.0 * light.radius;
-    default:
-      return 0.0;
-  }
+void solve(const Case& c, MethodResult& method) {
+  solve_masks(c.mesh, c.receivers, c.light, c.samples, method.config, method.masks, method.stats);
 }
 
-double box_diagonal(const Scene& scene) {
-  dvec3 low = scene.positions.at(0), high = low;
-  for (const dvec3& p : scene.positions) low = glm::min(low, p), high = glm::max(high, p);
-  return glm::length(high - low);
-}
-
-std::vector<std::uint32_t> tile_order(const GBuffer& gbuffer, const ReceiverArray& receivers) {
-  const auto key = [&](std::uint32_t r) {
-    const std::uint32_t x = receivers.sample[r] % gbuffer.window.width(),
-                        y = receivers.sample[r] / gbuffer.window.width();
-    return std::array<std::uint32_t, 4>{y / 4, x / 4, y % 4, x % 4};
-  };
-  std::vector<std::uint32_t> order(receivers.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
-  return order;
-}
-
-/// The same steps as the command line's render verb. The mesh refers to `scene`.
-Case make_case(const std::string& name, const Scene& scene, const View& view, std::size_t light, const Options& o) {
-  Case c;
-  c.scene = name;
-  c.light = view.lights[light];
-  c.light_name = c.light.name;
-  c.light_percent = 100.0 * light_diagonal(c.light) / box_diagonal(scene);
-  std::vector<dvec3> reach;
-  for (const Light& l : view.lights) {
-    const std::vector<dvec3> extent = light_extent(l);
-    reach.insert(reach.end(), extent.begin(), extent.end());
-  }
-  c.mesh = make_lattice_mesh(scene, make_local_frame(scene.positions, reach));
-  RasterConfig raster;
-  if (std::sscanf(o.size.c_str(), "%5ux%5u", &raster.width, &raster.height) != 2) {
-    throw Error(ErrorCode::kUsage, "--size '" + o.size + "' is not WIDTHxHEIGHT");
-  }
-  rasterize(c.mesh, view.camera, raster, c.gbuffer);
+ShadowConfig config_of(const Options& o) {
   ShadowConfig config;
   config.light_sample_count = o.light_samples;
   config.pattern = sample_pattern_from_name(o.pattern);
   config.sample_sets = o.sets;
   config.seed = o.seed;
-  c.samples = make_light_samples(c.light, config, c.mesh.frame);
-  c.receivers = make_receivers(c.gbuffer, c.samples, o.seed);
-  c.order = tile_order(c.gbuffer, c.receivers);
-  return c;
-}
-
-/// Receivers in random order against the oracle, until the wanted share or the time is used up.
-OracleCheck check_with_oracle(const Case& c, const VisibilityMasks& masks, const Options& o) {
-  constexpr std::size_t kBatch = 64;
-  std::vector<std::uint32_t> chosen(c.receivers.size());
-  std::iota(chosen.begin(), chosen.end(), 0u);
-  std::sort(chosen.begin(), chosen.end(),
-            [](std::uint32_t a, std::uint32_t b) { return hash32(a, 0x5eed) < hash32(b, 0x5eed); });
-  chosen.resize(static_cast<std::size_t>(std::ceil(static_cast<double>(chosen.size()) * o.verify_percent * 0.01)));
-  OracleCheck check;
-  Stopwatch watch;
-  for (double ms = 0.0; check.receivers < chosen.size() && ms < 1000.0 * o.verify_seconds; ms += watch.lap()) {
-    const std::size_t first = check.receivers, count = std::min(kBatch, chosen.size() - first);
-    std::vector<std::uint64_t> wrong(count, 0);
-    parallel_ranges(count, 1, [&](std::size_t begin, std::size_t end) {
-      std::vector<std::uint64_t> truth(masks.words_per_receiver);
-      for (std::size_t i = begin; i != end; ++i) {
-        std::fill(truth.begin(), truth.end(), 0);
-        oracle_mask(c.mesh, c.receivers, chosen[first + i], c.samples, truth);
-        const auto mask = masks.mask(chosen[first + i]);
-        for (std::size_t w = 0; w < truth.size(); ++w)
-          wrong[i] += static_cast<std::uint64_t>(std::popcount(truth[w] ^ mask[w]));
-      }
-    });
-    check.receivers += count;
-    for (const std::uint64_t w : wrong) check.wrong_bits += w;
-  }
-  return check;
-}
-
-void solve(const Case& c, MethodResult& method) {
-  solve_masks(c.mesh, c.receivers, c.light, c.samples, method.config, method.masks, method.stats);
+  return config;
 }
 
 std::vector<MethodResult> solve_all(const Case& c, const Options& o) {
@@ -169,13 +70,10 @@ std::vector<MethodResult> solve_all(const Case& c, const Options& o) {
   for (const std::string& name : o.methods) {
     MethodResult& m = methods.emplace_back();
     m.name = name;
+    m.config = config_of(o);
     m.config.method = shadow_method_from_name(name);
-    m.config.light_sample_count = o.light_samples;
-    m.config.sample_sets = o.sets;
-    m.config.seed = o.seed;
-    m.config.pattern = sample_pattern_from_name(o.pattern);
     solve(c, m);
-    m.check = check_with_oracle(c, m.masks, o);
+    m.check = check_with_oracle(c, m.masks, o.verify_percent, o.verify_seconds);
   }
   return methods;
 }
@@ -305,8 +203,6 @@ std::vector<Row> run_case(const Case& c, const Options& o, int threads, ordered_
   return rows;
 }
 
-void scale_light(Light& light, double factor) { light.u *= factor, light.v *= factor, light.radius *= factor; }
-
 void run_scene(const std::string& name, const Options& o, int threads, std::vector<Row>& rows, ordered_json& cases) {
   const SceneSource source = load_scene(name, "", ObjLoadOptions());
   const std::vector<double> scales = o.light_scales.empty() ? std::vector<double>{0.0} : o.light_scales;
@@ -319,7 +215,7 @@ void run_scene(const std::string& name, const Options& o, int threads, std::vect
         continue;
       }
       if (percent > 0.0) scale_light(view.lights[i], percent * 0.01 * box_diagonal(source.scene) / diagonal);
-      const Case c = make_case(name, source.scene, view, i, o);
+      const Case c = make_case(name, source.scene, view, i, o.size, config_of(o));
       if (c.receivers.size() == 0) {
         fmt::print(stderr, "halfshade_bench: {}: no receiver faces light '{}'\n", name, c.light_name);
         continue;

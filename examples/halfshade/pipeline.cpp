@@ -10,6 +10,7 @@
 
 #include "halfshade/error.h"
 #include "rasterizer/core/stopwatch.h"
+#include "shadows/method_options.h"
 #include "shadows/solver.h"
 #include "stats_json.h"
 
@@ -81,6 +82,20 @@ void print_warnings(const PipelineOptions& options, const Pipeline& pipeline) {
   }
 }
 
+std::string method_names() {
+  std::string names;
+  for (const MethodTraits& m : shadow_methods()) names += (names.empty() ? "" : ", ") + std::string(m.name);
+  return names;
+}
+
+std::string option_list() {
+  std::string list;
+  const ShadowConfig defaults;
+  for (const MethodOption& option : method_options())
+    list += fmt::format("{}={}: {}\n", option.name, option.get(defaults), option.help);
+  return list;
+}
+
 }  // namespace
 
 void draw(const PipelineOptions& options, Pipeline& pipeline) {
@@ -109,10 +124,17 @@ ShadowConfig shadow_config(const PipelineOptions& options) {
   config.seed = options.seed;
   config.grid_resolution = options.grid;
   config.back_face_casters = !options.all_faces;
+  for (const std::string& setting : options.settings) set_method_option(config, setting);
   return config;
 }
 
 nlohmann::ordered_json method_json(const PipelineOptions& o) {
+  const ShadowConfig config = shadow_config(o);
+  nlohmann::ordered_json options = nlohmann::ordered_json::object();
+  for (const MethodOption& option : method_options()) {
+    const std::string name = option.name;
+    if (name.starts_with(o.method + ".")) options[name] = option.get(config);
+  }
   return {{"name", o.method},
           {"light_samples", o.light_samples},
           {"pattern", o.pattern},
@@ -121,7 +143,21 @@ nlohmann::ordered_json method_json(const PipelineOptions& o) {
           {"rotate", o.rotate},
           {"seed", o.seed},
           {"grid_resolution", o.grid},
-          {"exact", true}};
+          {"options", options},
+          {"exact", traits_of(config.method).exact}};
+}
+
+void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                           const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
+                           std::vector<float>& visibility, ShadowStats& stats) {
+  if (!traits_of(config.method).masks) {
+    masks = {};
+    solve_visibility(mesh, receivers, light, samples, config, visibility, stats);
+    return;
+  }
+  solve_masks(mesh, receivers, light, samples, config, masks, stats);
+  visibility.resize(receivers.size());
+  for (std::size_t i = 0; i < receivers.size(); ++i) visibility[i] = masks.visibility(i);
 }
 
 void run_in_arena(int threads, const std::function<void()>& body) {
@@ -155,7 +191,9 @@ void add_pipeline_options(CLI::App& verb, PipelineOptions& options) {
   verb.add_option("--shading", options.shading,
                   "plain: interpolated normals; bent: also fade out where facets turn away from the light")
       ->capture_default_str();
-  verb.add_option("--method", options.method, "Shadow method: exact, afsm, oracle")->capture_default_str();
+  verb.add_option("--method", options.method, "Shadow method: " + method_names())->capture_default_str();
+  verb.add_option("--set", options.settings, "Option of a method, NAME=VALUE; may be repeated:\n" + option_list())
+      ->allow_extra_args(false);
   verb.add_option("--light-samples", options.light_samples, "Samples per light, 1..4096")->capture_default_str();
   verb.add_option("--pattern", options.pattern,
                   "Sample pattern: rows, uniform, stratified, low-discrepancy, poisson-disk")

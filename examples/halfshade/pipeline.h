@@ -8,7 +8,7 @@
 #include "rasterizer/bent_normals.h"
 #include "rasterizer/rasterizer.h"
 #include "scene_source.h"
-#include "shadows/light_samples.h"
+#include "shadows/receivers.h"
 #include "verbs.h"
 
 namespace halfshade {
@@ -19,6 +19,7 @@ struct PipelineOptions {
   std::uint32_t spp = 1, light_samples = 256, sets = 1, seed = 0, grid = 0;
   int threads = 0;
   bool quiet = false, all_faces = false, interleave = false, rotate = false;
+  std::vector<std::string> settings;  // "method.option=value"
   ObjLoadOptions load;
   std::string command_line;
 };
@@ -48,6 +49,11 @@ void draw(const PipelineOptions& options, Pipeline& pipeline);
 /// Throws Error{kUsage} for unknown names.
 ShadowConfig shadow_config(const PipelineOptions& options);
 nlohmann::ordered_json method_json(const PipelineOptions& options);
+
+/// One light by the configured method: masks, where it yields them, and visibility per receiver.
+void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                           const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
+                           std::vector<float>& visibility, ShadowStats& stats);
 
 /// body() in an arena of the asked number of threads.
 void run_in_arena(int threads, const std::function<void()>& body);

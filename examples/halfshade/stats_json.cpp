@@ -46,6 +46,8 @@ nlohmann::ordered_json machine_json() {
 }
 
 nlohmann::ordered_json stats_json(const ShadowStats& s) {
+  nlohmann::ordered_json details = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : s.details) details[name] = value;
   return {{"index_ms", s.index_ms},
           {"cull_ms", s.cull_ms},
           {"test_ms", s.test_ms},
@@ -63,7 +65,8 @@ nlohmann::ordered_json stats_json(const ShadowStats& s) {
           {"leaves_tested", s.leaves_tested},
           {"clusters_lit", s.clusters_lit},
           {"everywhere_blockers", s.everywhere_blockers},
-          {"bytes", s.bytes}};
+          {"bytes", s.bytes},
+          {"details", details}};
 }
 
 std::uint64_t peak_rss_bytes() {

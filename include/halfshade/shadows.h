@@ -6,15 +6,10 @@
 
 #include "halfshade/error.h"
 #include "halfshade/light.h"
+#include "halfshade/methods.h"
 #include "halfshade/scene.h"
 
 namespace halfshade {
-
-enum class ShadowMethod {
-  kAliasFreeShadowMap,  // "afsm": Sintorn, Eisemann, Assarsson 2008
-  kExact,               // "exact": ours, receivers gather from a tree of blockers
-  kOracle,              // "oracle": brute force over all triangles, for checking; slow
-};
 
 enum class SamplePattern {
   kRows,            // rows of equal height share v, each row shifted by its own lattice offset
@@ -45,6 +40,11 @@ struct ShadowConfig {
   /// Temporal jitter: set k of frame f is element f + k of the pattern's sequence of sets, so every frame shows each
   /// receiver other samples. Point lights and explicit samples are the same in every frame. 0 .. 2^25 - 1.
   std::uint32_t frame = 0;
+  AliasFreeOptions afsm = {};
+  PenumbraCastingOptions hpc = {};
+  GearsOptions gears = {};
+  ShadowVolumeOptions stsv = {};
+  ShadowMapOptions shadow_map = {};
 };
 
 /// Blocked masks of all receivers: bit i of a receiver's words is set where light sample i is hidden.
@@ -88,6 +88,8 @@ struct ShadowStats {
   std::uint64_t clusters_lit = 0;                      // exact: clusters proved lit by an empty list
   std::uint64_t everywhere_blockers = 0;               // triangles without a bounded influence region
   std::uint64_t bytes = 0;                             // working memory of the method, without masks
+  /// What only one method counts or assumes: "hpc.penumbra_volumes", 1234. In the order they were noted.
+  std::vector<std::pair<std::string, double>> details;
 };
 
 /// A surface point that asks for the light.
@@ -99,9 +101,15 @@ struct Receiver {
 /// Answers `blocks(triangle, receiver, sample)` for every receiver and every sample of `light`; masks in receiver
 /// order. Positions are rounded to the lattice of the scene's local frame first (docs/decisions/0001); the answer is
 /// the one of exact arithmetic on the rounded points. Receivers behind a one-sided light are marked blocked in every
-/// sample. Throws Error{kUsage} for a configuration out of range, Error{kBadInput} for non-finite positions. Runs in
+/// sample. Throws Error{kUsage} for a configuration out of range
+/// or a method that yields no masks (methods.h), Error{kBadInput} for non-finite positions. Runs in
 /// the calling thread's TBB arena. Distinct calls may run concurrently.
 void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                    const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats = nullptr);
+
+/// The fraction of the light that each receiver sees, in [0, 1], by any method; masks are kept nowhere. The same
+/// errors and threads as solve_shadows; receivers behind a one-sided light see nothing.
+void solve_visibility(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                      const ShadowConfig& config, std::vector<float>& visibility, ShadowStats* stats = nullptr);
 
 }  // namespace halfshade

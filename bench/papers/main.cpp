@@ -1,0 +1,60 @@
+// halfshade_paper_bench PAPER: measures what a paper reports and prints it beside our numbers, as ratios.
+#include "papers.h"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <functional>
+#include <thread>
+
+namespace halfshade::bench {
+namespace {
+
+struct Paper {
+  const char* name;
+  const char* title;
+  void (*run)(const PaperOptions& options);
+};
+
+const std::vector<Paper>& papers() {
+  static const std::vector<Paper> all = {};
+  return all;
+}
+
+}  // namespace
+
+void print_claim(const std::string& claim, const std::string& paper, const std::string& ours) {
+  fmt::print("| {} | {} | {} |\n", claim, paper, ours);
+  std::fflush(stdout);
+}
+
+}  // namespace halfshade::bench
+
+int main(int argc, char** argv) {
+  using halfshade::bench::papers;
+  CLI::App app("Measures the claims of the papers again, as ratios on this machine.", "halfshade_paper_bench");
+  halfshade::bench::PaperOptions o;
+  app.add_option("--shared-scenes", o.shared_scenes, "Directory of real scenes (default: built-in scenes only)")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--size", o.size, "Picture in pixels, WIDTHxHEIGHT")->capture_default_str();
+  app.add_option("--threads", o.threads, "Threads")->check(CLI::Range(1, 1024))->capture_default_str();
+  app.add_option("--repeat", o.repeat, "Repetitions; medians count")->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_flag("--quick", o.quick, "Small and fast: to see that it works");
+  app.require_subcommand(1);
+  for (const auto& paper : papers()) app.add_subcommand(paper.name, paper.title);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    tbb::task_arena arena(o.threads);
+    arena.execute([&] {
+      for (const auto& paper : papers()) {
+        if (app.got_subcommand(paper.name)) paper.run(o);
+      }
+    });
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "halfshade_paper_bench: {}\n", e.what());
+    return 1;
+  }
+  return 0;
+}

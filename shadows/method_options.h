@@ -1,0 +1,22 @@
+// The options of single methods by name, as text: "afsm.grid" = "256". What the command line's --set and the charts
+// use.
+#pragma once
+
+#include "halfshade/shadows.h"
+
+namespace halfshade {
+
+struct MethodOption {
+  const char* name;                                             // "method.option"
+  const char* help;                                             // meaning, range, default
+  void (*set)(ShadowConfig& config, const std::string& value);  // throws Error{kUsage} naming the allowed range
+  std::string (*get)(const ShadowConfig& config);
+};
+
+/// All of them, by method.
+std::span<const MethodOption> method_options();
+
+/// `assignment` is "name=value". Throws Error{kUsage}.
+void set_method_option(ShadowConfig& config, const std::string& assignment);
+
+}  // namespace halfshade
