@@ -64,6 +64,7 @@ Case make_case(const std::string& name, const Scene& scene, const View& view, st
     throw Error(ErrorCode::kUsage, "size '" + size + "' is not WIDTHxHEIGHT");
   }
   rasterize(c.mesh, view.camera, raster, c.gbuffer);
+  c.mesh = opaque_part(c.mesh);  // ours and the rivals answer for the triangles that block
   c.samples = make_light_samples(c.light, config, c.mesh.frame);
   c.receivers = make_receivers(c.gbuffer, c.samples, config.seed);
   c.order = tile_order(c.gbuffer, c.receivers);

@@ -13,7 +13,7 @@
 #include "harness.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
-#include "rivals/embree_rays.h"
+#include "shadows/raytrace/embree_rays.h"
 #include "shadows/solver.h"
 
 namespace halfshade::bench {

@@ -1,23 +1,17 @@
 #include "rasterizer/rasterizer.h"
 
-#include <hwy/cache_control.h>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "halfshade/error.h"
-#include "rasterizer/attributes.h"
-#include "rasterizer/binning.h"
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/screen_pass.h"
 
 namespace halfshade {
 namespace {
 
 constexpr std::uint32_t kMaxPictureSide = 16384;
-constexpr std::size_t kTrianglesPerChunk = 4096;
-constexpr std::size_t kMaxTileCounters = std::size_t{1} << 22;  // (tile, chunk) pairs: 16 MiB of counts
-constexpr std::size_t kBatch = 64;                              // triangles per call of the coverage kernel
-constexpr std::uint32_t kPrefetchDistance = 8;                  // entries of a tile's list
 
 // ---- checks -----------------------------------------------------------------------------------------------------
 
@@ -64,36 +58,7 @@ void resize(GBuffer& gbuffer, const RasterConfig& config, const PixelWindow& win
   gbuffer.window = window;
 }
 
-// ---- stage 1: vertices to pixels, triangles to screen triangles ---------------------------------------------------
-
-std::vector<PixelPoint> project_vertices(const LatticeMesh& mesh, const CameraFrame& camera) {
-  std::vector<PixelPoint> points(mesh.positions.size());
-  parallel_ranges(points.size(), 8192, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) points[i] = camera.project(dvec3(mesh.positions[i]));
-  });
-  return points;
-}
-
-TriangleChunks set_up(const LatticeMesh& mesh, const CameraFrame& camera, const TileGrid& grid, RasterStats& stats) {
-  const std::vector<PixelPoint> points = project_vertices(mesh, camera);
-  const std::size_t count = mesh.triangles.size();
-  const std::size_t most = std::max<std::size_t>(1, kMaxTileCounters / grid.size());
-  const std::size_t chunk_count = std::clamp<std::size_t>(count / kTrianglesPerChunk, 1, most);
-  TriangleChunks chunks(chunk_count);
-  std::vector<SetupCounts> counts(chunk_count);
-  parallel_tasks(chunk_count, [&](std::size_t chunk) {
-    const std::size_t begin = count * chunk / chunk_count, end = count * (chunk + 1) / chunk_count;
-    chunks[chunk].reserve(end - begin);
-    set_up_triangles(mesh, camera, points, grid.window, begin, end, chunks[chunk], counts[chunk]);
-  });
-  for (const SetupCounts& c : counts) {
-    stats.triangles_clipped += c.clipped;
-    stats.triangles_binned += c.survived;
-  }
-  return chunks;
-}
-
-// ---- stage 2: one tile ----------------------------------------------------------------------------------------------
+// ---- one tile -----------------------------------------------------------------------------------------------------
 
 // What is nearest so far. 1/w grows towards the eye; 0 is infinitely far away.
 struct VisibilityTile {
@@ -101,95 +66,86 @@ struct VisibilityTile {
   std::array<std::uint32_t, kTileSize * kTileSize> triangle;  // [row][column], or kNone
 };
 
-class TileRasterizer {
- public:
-  TileRasterizer(const LatticeMesh& mesh, const CameraFrame& camera, const PixelWindow& tile)
-      : mesh_(mesh), camera_(camera), tile_(tile) {
-    visible_.inverse_w.fill(0.0);
-    visible_.triangle.fill(kNone);
-  }
+// Nearer wins; on a tie the triangle that came first stays. Returns the number of covered samples.
+std::uint64_t draw_tile(const LatticeMesh& mesh, const CameraFrame& camera, TileCoverage& coverage,
+                        VisibilityTile& visible) {
+  std::uint64_t covered = 0;
+  coverage.for_each([&](const ScreenTriangle& piece, const TileTriangle& part, const RowSpan* spans) {
+    covered += draw_samples(
+        mesh, camera, coverage.window(), piece, part, spans,
+        [&](std::size_t sample, double inverse_w) { return inverse_w > visible.inverse_w[sample]; },
+        [&](std::size_t sample, double inverse_w) {
+          visible.inverse_w[sample] = inverse_w;
+          visible.triangle[sample] = piece.triangle;
+        });
+  });
+  return covered;
+}
 
-  void add(const ScreenTriangle& piece) {
-    if (!make_tile_triangle(piece, tile_, parts_[batched_])) return;
-    pieces_[batched_++] = &piece;
-    if (batched_ == kBatch) flush();
-  }
-
-  /// Coverage, then depth, for the triangles added since the last call, in the order they were added.
-  void flush() {
-    cover_rows({parts_.data(), batched_}, spans_);
-    const RowSpan* spans = spans_.data();
-    for (std::size_t i = 0; i != batched_; ++i) {
-      if (pieces_[i]->alpha_map == kNone) {
-        draw(*pieces_[i], parts_[i], spans, [](double, double) { return true; });
-      } else {
-        const AlphaTest test(mesh_, camera_, pieces_[i]->triangle, pieces_[i]->alpha_map);
-        draw(*pieces_[i], parts_[i], spans, [&](double x, double y) { return test.passes(camera_.ray(x, y)); });
-      }
-      spans += parts_[i].height;
-    }
-    batched_ = 0;
-  }
-
-  void resolve(GBuffer& gbuffer) const {
-    for (std::uint32_t row = 0; row != tile_.height(); ++row) {
-      resolve_row(mesh_, camera_, tile_.x0, tile_.y0 + row, {&visible_.triangle[row * kTileSize], tile_.width()},
+void draw_tiles(const LatticeMesh& mesh, const CameraFrame& camera, const ScreenPass& pass, GBuffer& gbuffer,
+                RasterStats& stats) {
+  std::atomic<std::uint64_t> samples_covered{0};
+  parallel_tasks(pass.grid.size(), [&](std::size_t tile) {
+    TileCoverage coverage(pass, tile);
+    VisibilityTile visible;
+    visible.inverse_w.fill(0.0);
+    visible.triangle.fill(kNone);
+    samples_covered.fetch_add(draw_tile(mesh, camera, coverage, visible), std::memory_order_relaxed);
+    const PixelWindow& window = coverage.window();
+    for (std::uint32_t row = 0; row != window.height(); ++row) {
+      resolve_row(mesh, camera, window.x0, window.y0 + row, {&visible.triangle[row * kTileSize], window.width()},
                   gbuffer);
     }
-  }
-
-  std::uint64_t samples_covered() const { return samples_covered_; }
-
- private:
-  // Nearer wins; on a tie the triangle that came first stays.
-  template <class Passes>
-  void draw(const ScreenTriangle& piece, const TileTriangle& part, const RowSpan* spans, const Passes& passes) {
-    for (std::uint32_t j = 0; j != part.height; ++j) {
-      const std::uint32_t row = part.row + j, begin = span_begin(spans[j]), end = span_end(spans[j]);
-      const double y_px = tile_.y0 + row + 0.5;
-      const double row_term = piece.depth.row_term(y_px);
-      for (std::uint32_t column = begin; column != end; ++column) {
-        const double x_px = tile_.x0 + column + 0.5;
-        const double inverse_w = piece.depth.at(x_px, row_term);
-        const std::size_t sample = row * kTileSize + column;
-        if (!(inverse_w > visible_.inverse_w[sample]) || !passes(x_px, y_px)) continue;
-        visible_.inverse_w[sample] = inverse_w;
-        visible_.triangle[sample] = piece.triangle;
-      }
-      samples_covered_ += end - begin;
-    }
-  }
-
-  const LatticeMesh& mesh_;
-  const CameraFrame& camera_;
-  const PixelWindow tile_;
-  VisibilityTile visible_;
-  std::array<TileTriangle, kBatch> parts_;
-  std::array<const ScreenTriangle*, kBatch> pieces_;
-  std::array<RowSpan, kBatch * kTileSize> spans_;
-  std::size_t batched_ = 0;
-  std::uint64_t samples_covered_ = 0;
-};
-
-void draw_tiles(const LatticeMesh& mesh, const CameraFrame& camera, const TriangleChunks& chunks, const TileGrid& grid,
-                const TileBins& bins, GBuffer& gbuffer, RasterStats& stats) {
-  std::atomic<std::uint64_t> samples_covered{0};
-  parallel_tasks(grid.size(), [&](std::size_t tile) {
-    TileRasterizer rasterizer(mesh, camera, grid.tile(tile));
-    for (std::size_t chunk = 0; chunk != bins.chunk_count; ++chunk) {
-      const std::vector<ScreenTriangle>& pieces = chunks[chunk];
-      const std::uint32_t end = bins.offset(tile, chunk + 1);
-      for (std::uint32_t i = bins.offset(tile, chunk); i != end; ++i) {
-        // A tile's pieces lie scattered over the chunk: ask for them ahead of time.
-        if (i + kPrefetchDistance < end) hwy::Prefetch(&pieces[bins.entries[i + kPrefetchDistance]]);
-        rasterizer.add(pieces[bins.entries[i]]);
-      }
-    }
-    rasterizer.flush();
-    rasterizer.resolve(gbuffer);
-    samples_covered.fetch_add(rasterizer.samples_covered(), std::memory_order_relaxed);
   });
   stats.samples_covered = samples_covered.load();
+}
+
+// ---- a picture in pieces --------------------------------------------------------------------------------------------
+
+std::size_t entry_of(const GBuffer& gbuffer, std::uint32_t x, std::uint32_t y) {
+  return std::size_t{y - gbuffer.window.y0} * gbuffer.window.width() + (x - gbuffer.window.x0);
+}
+
+// The attributes of `count` entries that a triangle of this piece has won.
+void resolve_run(const LatticeMesh& piece, const CameraFrame& camera, std::uint32_t first_triangle, std::uint32_t x,
+                 std::uint32_t y, std::span<const std::uint32_t> triangles, GBuffer& gbuffer) {
+  resolve_row(piece, camera, x, y, triangles, gbuffer);
+  const std::size_t entry = entry_of(gbuffer, x, y);
+  for (std::size_t i = 0; i != triangles.size(); ++i) gbuffer.triangle[entry + i] += first_triangle;
+}
+
+// Keeps what the piece has won in one row of a tile.
+void merge_row(const LatticeMesh& piece, const CameraFrame& camera, std::uint32_t first_triangle, std::uint32_t x0,
+               std::uint32_t y, std::span<const std::uint32_t> triangles, GBuffer& gbuffer) {
+  for (std::size_t begin = 0; begin != triangles.size();) {
+    std::size_t end = begin + 1;
+    while (end != triangles.size() && (triangles[end] == kNone) == (triangles[begin] == kNone)) ++end;
+    if (triangles[begin] != kNone) {
+      resolve_run(piece, camera, first_triangle, x0 + static_cast<std::uint32_t>(begin), y,
+                  triangles.subspan(begin, end - begin), gbuffer);
+    }
+    begin = end;
+  }
+}
+
+void merge_tile(const LatticeMesh& piece, const CameraFrame& camera, std::uint32_t first_triangle,
+                TileCoverage& coverage, PiecewisePicture& picture, std::uint64_t& covered) {
+  const PixelWindow& window = coverage.window();
+  VisibilityTile visible;
+  visible.triangle.fill(kNone);
+  const auto row_depths = [&](std::uint32_t row) {
+    return picture.inverse_w.begin() +
+           static_cast<std::ptrdiff_t>(entry_of(picture.gbuffer, window.x0, window.y0 + row));
+  };
+  for (std::uint32_t row = 0; row != window.height(); ++row) {
+    std::copy_n(row_depths(row), window.width(), visible.inverse_w.begin() + row * kTileSize);
+  }
+  covered += draw_tile(piece, camera, coverage, visible);
+  for (std::uint32_t row = 0; row != window.height(); ++row) {
+    std::copy_n(visible.inverse_w.begin() + row * kTileSize, window.width(), row_depths(row));
+    merge_row(piece, camera, first_triangle, window.x0, window.y0 + row,
+              {&visible.triangle[row * kTileSize], window.width()}, picture.gbuffer);
+  }
 }
 
 // The digits of `index` in `base`, mirrored at the point (van der Corput): in [0, 1). Exact up to the division.
@@ -200,6 +156,14 @@ double radical_inverse(std::uint32_t index, std::uint32_t base) {
     scale *= base;
   }
   return static_cast<double>(mirrored) / static_cast<double>(scale);
+}
+
+CameraFrame picture_frame(const Camera& camera, const LocalFrame& local, const RasterConfig& config) {
+  CameraFrame frame = make_camera_frame(camera, local, config.width, config.height);
+  // Projection and rays both go through the centre, so moving it moves them alike.
+  frame.center_x_px -= config.subpixel_offset.x;
+  frame.center_y_px -= config.subpixel_offset.y;
+  return frame;
 }
 
 double centered(double unit) { return unit < 0.5 ? unit : unit - 1.0; }
@@ -216,20 +180,42 @@ void rasterize(const LatticeMesh& mesh, const Camera& camera, const RasterConfig
                RasterStats* stats) {
   const FpEnvironment environment;
   const PixelWindow window = checked_window(config);
-  CameraFrame frame = make_camera_frame(camera, mesh.frame, config.width, config.height);
-  // Projection and rays both go through the centre, so moving it moves them alike.
-  frame.center_x_px -= config.subpixel_offset.x;
-  frame.center_y_px -= config.subpixel_offset.y;
-  const TileGrid grid = make_tile_grid(window);
-
+  const CameraFrame frame = picture_frame(camera, mesh.frame, config);
+  const ScreenPass pass = make_screen_pass(mesh, frame, window);
   RasterStats counted;
   counted.triangles_in = mesh.triangles.size();
-  const TriangleChunks chunks = set_up(mesh, frame, grid, counted);
-  const TileBins bins = bin_triangles(chunks, grid);
-  counted.tile_entries = bins.entries.size();
+  counted.triangles_clipped = pass.counts.clipped;
+  counted.triangles_binned = pass.counts.survived;
+  counted.tile_entries = pass.bins.entries.size();
   resize(gbuffer, config, window);
-  draw_tiles(mesh, frame, chunks, grid, bins, gbuffer, counted);
+  draw_tiles(mesh, frame, pass, gbuffer, counted);
   if (stats != nullptr) *stats = counted;
+}
+
+PiecewisePicture begin_picture(const RasterConfig& config) {
+  PiecewisePicture picture;
+  GBuffer& gbuffer = picture.gbuffer;
+  resize(gbuffer, config, checked_window(config));
+  std::fill(gbuffer.triangle.begin(), gbuffer.triangle.end(), kNone);
+  picture.inverse_w.assign(gbuffer.size(), 0.0);
+  return picture;
+}
+
+void rasterize_piece(const LatticeMesh& piece, std::uint32_t first_triangle, const Camera& camera,
+                     const RasterConfig& config, PiecewisePicture& picture, RasterStats& stats) {
+  const FpEnvironment environment;
+  const CameraFrame frame = picture_frame(camera, piece.frame, config);
+  const ScreenPass pass = make_screen_pass(piece, frame, picture.gbuffer.window);
+  std::vector<std::uint64_t> covered(pass.grid.size(), 0);
+  parallel_tasks(pass.grid.size(), [&](std::size_t tile) {
+    TileCoverage coverage(pass, tile);
+    merge_tile(piece, frame, first_triangle, coverage, picture, covered[tile]);
+  });
+  stats.triangles_in += piece.triangles.size();
+  stats.triangles_clipped += pass.counts.clipped;
+  stats.triangles_binned += pass.counts.survived;
+  stats.tile_entries += pass.bins.entries.size();
+  for (const std::uint64_t c : covered) stats.samples_covered += c;
 }
 
 }  // namespace halfshade

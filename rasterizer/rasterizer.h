@@ -34,4 +34,17 @@ struct RasterStats {
 void rasterize(const LatticeMesh& mesh, const Camera& camera, const RasterConfig& config, GBuffer& gbuffer,
                RasterStats* stats = nullptr);
 
+/// A picture of a scene that comes in pieces: the same G-buffer as of the whole scene, if pieces are drawn in order.
+struct PiecewisePicture {
+  GBuffer gbuffer;                // `triangle` counts through all pieces
+  std::vector<double> inverse_w;  // [entry] of what is nearest so far, 0 = nothing
+};
+
+/// Nothing drawn yet. Throws as rasterize.
+PiecewisePicture begin_picture(const RasterConfig& config);
+
+/// Draws a piece whose first triangle has number `first_triangle`. The frame of all pieces must be the same.
+void rasterize_piece(const LatticeMesh& piece, std::uint32_t first_triangle, const Camera& camera,
+                     const RasterConfig& config, PiecewisePicture& picture, RasterStats& stats);
+
 }  // namespace halfshade

@@ -13,4 +13,7 @@ void solve_alias_free_shadow_map(const LatticeMesh& mesh, const ReceiverArray& r
                                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
                                  ShadowStats& stats);
 
+/// What afsm-lut takes for granted, for people.
+std::string assumptions_of_lookup_table(const ShadowConfig& config);
+
 }  // namespace halfshade

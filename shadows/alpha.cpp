@@ -78,14 +78,21 @@ std::int64_t exact_texel(const std::array<Int128, 3>& w, const std::array<std::i
 }
 
 std::uint32_t wrap(std::int64_t texel, std::uint32_t size) {
+  if (texel >= 0 && texel < static_cast<std::int64_t>(size)) return static_cast<std::uint32_t>(texel);
   const std::int64_t m = texel % static_cast<std::int64_t>(size);
   return static_cast<std::uint32_t>(m < 0 ? m + size : m);
+}
+
+/// |x| < 2^62. Without the library call that std::floor is on processors before SSE 4.1.
+std::int64_t floor_of(double x) {
+  const auto truncated = static_cast<std::int64_t>(x);
+  return truncated - (x < static_cast<double>(truncated));
 }
 
 /// One coordinate of the texel: double where the bound leaves one integer, else exact.
 class TexelFinder {
  public:
-  TexelFinder(const AlphaTriangle& triangle, const vec3& r, const vec3& l)
+  TexelFinder(const TexturedTriangle& triangle, const vec3& r, const vec3& l)
       : triangle_(triangle), r_(r), l_(l), weights_(edge_weights(triangle.corners, r, l)) {
     sum_ = weights_.value[0] + weights_.value[1] + weights_.value[2];
   }
@@ -109,7 +116,7 @@ class TexelFinder {
   }
 
  private:
-  const AlphaTriangle& triangle_;
+  const TexturedTriangle& triangle_;
   const vec3 &r_, &l_;
   Weights weights_;
   double sum_ = 0.0;
@@ -124,31 +131,35 @@ std::uint32_t opaque_threshold(float cutoff) {
   return 256;
 }
 
-AlphaTriangle make_alpha_triangle(const LatticeMesh& mesh, std::uint32_t triangle) {
-  const Scene& scene = *mesh.scene;
-  const Material& material = scene.materials[scene.triangle_materials[triangle]];
-  AlphaTriangle result;
+TexturedTriangle make_textured_triangle(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t width,
+                                        std::uint32_t height) {
+  TexturedTriangle result;
   result.corners = mesh.corners(triangle);
   for (int i = 0; i < 3; ++i) {
-    const vec2 uv = scene.triangle_uvs[triangle][i];
+    const vec2 uv = mesh.scene->triangle_uvs[triangle][i];
     result.u[i] = static_cast<std::int64_t>(std::nearbyint(static_cast<double>(uv.x) * kUvUnitsPerOne));
     result.v[i] = static_cast<std::int64_t>(std::nearbyint(static_cast<double>(uv.y) * kUvUnitsPerOne));
   }
-  result.map = &scene.alpha_maps[material.alpha_map];
-  result.threshold = opaque_threshold(material.alpha_cutoff);
+  result.width = width, result.height = height;
   return result;
 }
 
-std::array<std::uint32_t, 2> texel_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l,
-                                          std::uint64_t* exact_fallbacks) {
-  const TexelFinder finder(triangle, r, l);
-  const std::uint32_t width = triangle.map->width, height = triangle.map->height;
-  const std::uint32_t column = wrap(finder.find(triangle.u, width, exact_fallbacks), width);
-  const std::uint32_t up = wrap(finder.find(triangle.v, height, exact_fallbacks), height);
-  return {column, height - 1 - up};
+AlphaTriangle make_alpha_triangle(const LatticeMesh& mesh, std::uint32_t triangle) {
+  const Scene& scene = *mesh.scene;
+  const Material& material = scene.materials[scene.triangle_materials[triangle]];
+  const AlphaMap& map = scene.alpha_maps[material.alpha_map];
+  return {make_textured_triangle(mesh, triangle, map.width, map.height), &map, opaque_threshold(material.alpha_cutoff)};
 }
 
-AlphaLookup::AlphaLookup(const AlphaTriangle& triangle, const vec3& receiver)
+std::array<std::uint32_t, 2> texel_at_hit(const TexturedTriangle& triangle, const vec3& r, const vec3& l,
+                                          std::uint64_t* exact_fallbacks) {
+  const TexelFinder finder(triangle, r, l);
+  const std::uint32_t column = wrap(finder.find(triangle.u, triangle.width, exact_fallbacks), triangle.width);
+  const std::uint32_t up = wrap(finder.find(triangle.v, triangle.height, exact_fallbacks), triangle.height);
+  return {column, triangle.height - 1 - up};
+}
+
+TexelLookup::TexelLookup(const TexturedTriangle& triangle, const vec3& receiver)
     : triangle_(triangle), receiver_(receiver) {
   const auto norm1 = [](const dvec3& v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); };
   const dvec3 origin(receiver);
@@ -156,8 +167,8 @@ AlphaLookup::AlphaLookup(const AlphaTriangle& triangle, const vec3& receiver)
   for (int i = 0; i < 3; ++i) {
     const dvec3 a = dvec3(triangle.corners[(i + 1) % 3]) - origin, b = dvec3(triangle.corners[(i + 2) % 3]) - origin;
     const dvec3 weight = glm::cross(a, b);
-    const double u = static_cast<double>(triangle.u[i]) * (triangle.map->width / kUvUnitsPerOne);
-    const double v = static_cast<double>(triangle.v[i]) * (triangle.map->height / kUvUnitsPerOne);
+    const double u = static_cast<double>(triangle.u[i]) * (triangle.width / kUvUnitsPerOne);
+    const double v = static_cast<double>(triangle.v[i]) * (triangle.height / kUvUnitsPerOne);
     u_ += weight * u, v_ += weight * v, sum_ += weight;
     size += norm1(a) * norm1(b);
     reach = std::max({reach, std::fabs(u), std::fabs(v)});
@@ -168,20 +179,18 @@ AlphaLookup::AlphaLookup(const AlphaTriangle& triangle, const vec3& receiver)
   texel_reach_ = reach;
 }
 
-bool AlphaLookup::opaque(const vec3& l, std::uint64_t& exact_fallbacks) const {
+std::array<std::uint32_t, 2> TexelLookup::texel(const vec3& l, std::uint64_t& exact_fallbacks) const {
   const dvec3 s = dvec3(l) - dvec3(receiver_);
   const double sum = glm::dot(sum_, s), spread = error_ * (std::fabs(s.x) + std::fabs(s.y) + std::fabs(s.z));
   const double error = texel_reach_ * (2.0 * spread / std::fabs(sum) + 8.0 * 0x1p-53) * 2.0;
+  if (!(std::fabs(sum) > 4.0 * spread)) return texel_at_hit(triangle_, receiver_, l, &exact_fallbacks);
+  // Near a mean of the corners' coordinates, which are below 2^46 texels: they fit into integers.
   const double u = glm::dot(u_, s) / sum, v = glm::dot(v_, s) / sum;
-  const double column = std::floor(u), up = std::floor(v);
-  const double from_border = std::min({u - column, column + 1.0 - u, v - up, up + 1.0 - v});
-  if (!(std::fabs(sum) > 4.0 * spread && from_border > error)) {
-    return opaque_at_hit(triangle_, receiver_, l, &exact_fallbacks);
-  }
-  const AlphaMap& map = *triangle_.map;
-  const std::uint32_t x = wrap(static_cast<std::int64_t>(column), map.width);
-  const std::uint32_t y = map.height - 1 - wrap(static_cast<std::int64_t>(up), map.height);
-  return map.alpha[std::size_t{y} * map.width + x] >= triangle_.threshold;
+  const std::int64_t column = floor_of(u), up = floor_of(v);
+  const double in_column = u - static_cast<double>(column), in_row = v - static_cast<double>(up);
+  const double from_border = std::min({in_column, 1.0 - in_column, in_row, 1.0 - in_row});
+  if (!(from_border > error)) return texel_at_hit(triangle_, receiver_, l, &exact_fallbacks);
+  return {wrap(column, triangle_.width), triangle_.height - 1 - wrap(up, triangle_.height)};
 }
 
 bool opaque_at_hit(const AlphaTriangle& triangle, const vec3& r, const vec3& l, std::uint64_t* exact_fallbacks) {

@@ -144,29 +144,26 @@ std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   return index;
 }
 
-void set_lane(const Blocker& b, const LightFrame& frame, std::uint32_t lane, BlockerTree::Leaf& leaf) {
+void set_lane(const Blocker& b, std::uint32_t lane, BlockerTree::Leaf& leaf) {
   for (int k = 0; k < 3; ++k) {
-    const dvec3 seen = frame.to_frame(dvec3(b.corner[k]));
-    for (int axis = 0; axis < 3; ++axis) leaf.seen[k][axis][lane] = static_cast<float>(seen[axis]);
     for (int axis = 0; axis < 3; ++axis) leaf.corner[k][axis][lane] = b.corner[k][axis];
-    leaf.edge_error[k][lane] = b.edge_error[k];
     leaf.normal[k][lane] = b.normal[k];
   }
   leaf.side_error[lane] = b.side_error;
   leaf.triangle[lane] = b.triangle;
 }
 
-void fill_leaf(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame, BlockerTree& tree,
-               BlockerTree::Leaf& leaf) {
-  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = 0;
+void fill_leaf(const LatticeMesh& mesh, const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
+  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = leaf.perforated = 0;
   leaf.box_low = vec3(1e30f), leaf.box_high = vec3(-1e30f);
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     const std::uint32_t place = leaf.first + std::min(lane, leaf.count - 1);  // unused lanes repeat the last triangle
     if (lane < leaf.count) tree.blockers[place] = make_blocker(mesh, samples, tree.order[place]);
     const Blocker& b = tree.blockers[place];
-    set_lane(b, frame, lane, leaf);
+    set_lane(b, lane, leaf);
     leaf.samples_above |= std::uint32_t{b.samples_above} << lane;
     leaf.samples_below |= std::uint32_t{b.samples_below} << lane;
+    leaf.perforated |= std::uint32_t{b.perforated} << lane;
     if (!b.back_faces_only) continue;
     leaf.back_faces_only |= 1u << lane;
     leaf.box_low = glm::min(leaf.box_low, b.box_low), leaf.box_high = glm::max(leaf.box_high, b.box_high);
@@ -214,7 +211,7 @@ void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, c
   std::vector<Bounds> leaf_box(tree.leaves.size()), node_box(tree.nodes.size());
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      fill_leaf(mesh, samples, frame, tree, tree.leaves[i]);
+      fill_leaf(mesh, samples, tree, tree.leaves[i]);
       leaf_box[i] = leaf_bounds(frame, tree, tree.leaves[i]);
     }
   });

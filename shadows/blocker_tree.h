@@ -31,11 +31,10 @@ struct BlockerTree {
   /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
   struct alignas(64) Leaf {
     float corner[3][3][kWidth];  // [corner][axis][lane]
-    float seen[3][3][kWidth];    // [corner][axis][lane], the same in the light's frame
-    float normal[3][kWidth], side_error[kWidth], edge_error[3][kWidth];
+    float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
-    std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0;
+    std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0, perforated = 0;
     vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
   };
   std::vector<std::uint32_t> order;  // triangles, leaf by leaf

@@ -1,9 +1,14 @@
 #include "shadows/closed_components.h"
 
 #include <algorithm>
+#include <atomic>
 #include <numeric>
 
+#include <glm/vector_relational.hpp>
+
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/predicate.h"
+#include "shadows/receivers.h"
 
 namespace halfshade {
 namespace {
@@ -24,13 +29,6 @@ std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
   return number;
 }
 
-/// One use of an edge by a triangle.
-struct EdgeUse {
-  std::uint64_t edge;  // both ends, the lower number first
-  std::uint32_t triangle;
-  std::int32_t direction;  // +1 from the lower to the higher end
-};
-
 std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<std::uint32_t>& number) {
   std::vector<EdgeUse> uses;
   uses.reserve(mesh.triangles.size() * 3);
@@ -39,11 +37,12 @@ std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<st
       const std::uint32_t a = number[mesh.triangles[t][k]], b = number[mesh.triangles[t][(k + 1) % 3]];
       if (a == b) continue;
       const std::uint64_t low = std::min(a, b), high = std::max(a, b);
-      uses.push_back({low << 32 | high, t, a < b ? 1 : -1});
+      uses.push_back({low << 32 | high, t, static_cast<std::int16_t>(a < b ? 1 : -1), static_cast<std::uint16_t>(k)});
     }
   }
   parallel_sort(uses, [](const EdgeUse& a, const EdgeUse& b) {
-    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
+    return a.edge != b.edge ? a.edge < b.edge
+                            : (a.triangle != b.triangle ? a.triangle < b.triangle : a.corner < b.corner);
   });
   return uses;
 }
@@ -64,22 +63,11 @@ class DisjointSets {
   std::vector<std::uint32_t> parent_;
 };
 
-/// Calls run(uses of one edge) for each edge.
-template <class Run>
-void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
-  while (!uses.empty()) {
-    std::size_t count = 1;
-    while (count < uses.size() && uses[count].edge == uses[0].edge) ++count;
-    run(uses.first(count));
-    uses = uses.subspan(count);
-  }
-}
-
 }  // namespace
 
-ClosedComponents find_closed_components(const LatticeMesh& mesh) {
+ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges) {
   const std::size_t count = mesh.triangles.size();
-  const std::vector<EdgeUse> uses = collect_edges(mesh, weld(mesh.positions));
+  std::vector<EdgeUse> uses = collect_edges(mesh, weld(mesh.positions));
   DisjointSets sets(count);
   for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
     for (const EdgeUse& use : edge) sets.join(edge[0].triangle, use.triangle);
@@ -109,14 +97,38 @@ ClosedComponents find_closed_components(const LatticeMesh& mesh) {
     ClosedComponents::Box& box = result.boxes[box_of_root[root]];
     for (const vec3& p : corners) box = {glm::min(box.low, p), glm::max(box.high, p)};
   }
+  if (edges != nullptr) *edges = std::move(uses);
   return result;
 }
 
-void certify(const LatticeMesh& mesh, const ShadowConfig& config, ClosedComponents& closed, KernelSamples& samples,
-             ShadowStats& stats) {
+namespace {
+
+/// See certify.
+void withdraw_certificates(const LatticeMesh& mesh, const ReceiverArray& receivers, KernelSamples& samples) {
+  parallel_ranges(receivers.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const std::uint32_t own = receivers.triangle[i];
+      const std::uint32_t c = own == kNone ? kNone : samples.closed->of_triangle[own];
+      if (c == kNone) continue;
+      const vec3& r = receivers.position[i];
+      const ClosedComponents::Box& box = samples.closed->boxes[c];
+      if (glm::all(glm::lessThanEqual(box.low, r)) && glm::all(glm::lessThanEqual(r, box.high))) continue;
+      const auto [p, q, s] = mesh.corners(own);
+      if (orient3d(p, q, s, r) > 0) {  // behind the triangle, along its normal
+        std::atomic_ref(samples.closed_usable[c]).store(0, std::memory_order_relaxed);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void certify(const LatticeMesh& mesh, const ReceiverArray& receivers, const ShadowConfig& config,
+             ClosedComponents& closed, KernelSamples& samples, ShadowStats& stats, std::vector<EdgeUse>* edges) {
   if (!config.back_face_casters) return;
-  closed = find_closed_components(mesh);
+  closed = find_closed_components(mesh, edges);
   use_certificate(closed, samples);
+  withdraw_certificates(mesh, receivers, samples);
   for (const std::uint32_t c : closed.of_triangle) {
     stats.certified_blockers += c != kNone && samples.closed_usable[c] != 0;
   }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "rasterizer/core/mesh.h"
+#include "shadows/receivers.h"
 #include "shadows/visibility_kernel.h"
 
 namespace halfshade {
@@ -20,11 +21,37 @@ struct ClosedComponents {
   std::uint32_t components = 0;            // closed or not
 };
 
+/// One use of an edge by a triangle.
+struct EdgeUse {
+  std::uint64_t edge;  // equal for all uses of an edge: welded numbers of both ends, the lower one first
+  std::uint32_t triangle;
+  std::int16_t direction;  // +1 from the lower to the higher end, else -1
+  std::uint16_t corner;    // the edge runs from this corner of the triangle to the next
+};
+
+/// Calls run(uses of one edge) for each edge; `uses` are sorted by edge.
+template <class Run>
+void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
+  while (!uses.empty()) {
+    std::size_t count = 1;
+    while (count < uses.size() && uses[count].edge == uses[0].edge) ++count;
+    run(uses.first(count));
+    uses = uses.subspan(count);
+  }
+}
+
 /// Connects triangles across edges whose ends have equal positions. Static for a mesh: build once.
-ClosedComponents find_closed_components(const LatticeMesh& mesh);
+/// `edges`, if given, gets all uses of edges, sorted.
+ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges = nullptr);
 
 /// If the configuration wants it: fills `closed`, lets the kernels use it, and counts the triangles it covers.
-void certify(const LatticeMesh& mesh, const ShadowConfig& config, ClosedComponents& closed, KernelSamples& samples,
-             ShadowStats& stats);
+///
+/// A receiver's own triangle never blocks it. That spoils the certificate only if the triangle shows the receiver its
+/// back: then the back face that decision 0002 finds may be the one that does not count. Receivers inside the box keep
+/// both sides anyway, but one lifted off a face of the box, or one that the caller put anywhere, can lie outside.
+/// Components with such a receiver (wound inside out, as a rule) are not used.
+void certify(const LatticeMesh& mesh, const ReceiverArray& receivers, const ShadowConfig& config,
+             ClosedComponents& closed, KernelSamples& samples, ShadowStats& stats,
+             std::vector<EdgeUse>* edges = nullptr);
 
 }  // namespace halfshade

@@ -121,6 +121,56 @@ HWY_INLINE BatchResult TestEdges(const PairLanes& pairs, const LightRegion& regi
   return result;
 }
 
+/// Receivers inside the box of the blocker's closed component.
+HWY_INLINE LaneMask InsideBox(const Vec3& p, const Blocker& b) {
+  const Tag d;
+  const Vec x = hn::Max(hn::Sub(hn::Set(d, b.box_low.x), p.x), hn::Sub(p.x, hn::Set(d, b.box_high.x)));
+  const Vec y = hn::Max(hn::Sub(hn::Set(d, b.box_low.y), p.y), hn::Sub(p.y, hn::Set(d, b.box_high.y)));
+  const Vec z = hn::Max(hn::Sub(hn::Set(d, b.box_low.z), p.z), hn::Sub(p.z, hn::Set(d, b.box_high.z)));
+  return hn::Le(hn::Max(x, hn::Max(y, z)), hn::Zero(d));
+}
+
+/// One blocker against the receivers [first, first + count), a lane each: which of them may lose a sample?
+HWY_INLINE BatchResult TestBatch(const Blocker& blocker, const KernelSamples& samples, const KernelReceivers& receivers,
+                                 std::size_t first, std::size_t count, EdgePlanes& planes) {
+  const Tag d;
+  const UintTag du;
+  BatchResult result;
+  const Vec3 r{hn::LoadU(d, &receivers.x[first]), hn::LoadU(d, &receivers.y[first]), hn::LoadU(d, &receivers.z[first])};
+  const auto own = hn::LoadU(du, &receivers.own[first]), open = hn::LoadU(du, &receivers.open[first]);
+  const auto usable = hn::AndNot(hn::VecFromMask(du, hn::Eq(own, hn::Set(du, blocker.triangle))), open);
+  LaneMask active = hn::And(hn::FirstN(d, count), hn::RebindMask(d, hn::Ne(usable, hn::Zero(du))));
+
+  const std::array<Vec3, 3> to_corner = {Subtract(Splat(blocker.corner[0]), r), Subtract(Splat(blocker.corner[1]), r),
+                                         Subtract(Splat(blocker.corner[2]), r)};
+  const Vec side = Dot(Splat(blocker.normal), to_corner[0]);
+  const Vec side_error = hn::Mul(hn::Set(d, blocker.side_error), Norm1(to_corner[0]));
+  // normal . (corner - r) > 0: the plane lies above the receiver (along the normal), which hides only samples above it.
+  const LaneMask above = hn::Gt(side, side_error), below = hn::Lt(side, hn::Neg(side_error));
+  const LaneMask unknown = hn::Not(hn::Or(above, below));
+  LaneMask facing = unknown;
+  if (blocker.samples_above) facing = hn::Or(facing, above);
+  if (blocker.samples_below) facing = hn::Or(facing, below);
+  active = hn::And(active, facing);
+  if (blocker.back_faces_only) {  // front faces count only for receivers inside the component's box
+    active = hn::And(active, hn::Or(hn::Not(below), InsideBox(r, blocker)));
+  }
+  if (hn::AllFalse(d, active)) return result;
+
+  PairLanes pairs;
+  pairs.to_corner = to_corner;
+  for (std::size_t k = 0; k < 3; ++k) {
+    pairs.edge[k] = Splat(blocker.edge[k]);
+    pairs.edge_error[k] = hn::Set(d, blocker.edge_error[k]);
+  }
+  pairs.to_center = Subtract(Splat(samples.center), r);
+  pairs.distance = hn::Add(NormMax(pairs.to_center), hn::Set(d, samples.reach));
+  pairs.active = active, pairs.below = below, pairs.unknown = unknown;
+  const LightRegion whole{Splat(vec3(0.0f)),
+                          {Splat(samples.half_axes[0]), Splat(samples.half_axes[1]), Splat(samples.half_axes[2])}};
+  return TestEdges(pairs, whole, planes);
+}
+
 /// One lane's planes, scaled so that values beyond +-1 are certain. The fourth is the blocker's own plane.
 struct ScaledPlanes {
   float mx[4], my[4], mz[4], d[4];
@@ -212,18 +262,21 @@ HWY_INLINE std::uint64_t OpenGroups(const std::uint64_t* valid, const std::uint6
   return open;
 }
 
-/// Tests every still open sample of one receiver; true where bits were added.
+/// Tests every still open sample of one receiver; true where bits were added. `active`, if given, has a bit for every
+/// group of samples that the blocker can matter to; the others are left alone.
 HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples, const ScaledPlanes& planes,
-                            std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters) {
+                            std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters,
+                            const std::uint64_t* active = nullptr) {
   constexpr std::uint32_t kGroup = KernelSamples::kGroup;
   const std::size_t set = receivers.set[receiver], offset = set * samples.padded,
                     groups_at = set * samples.group_stride;
   const vec3 r(receivers.x[receiver], receivers.y[receiver], receivers.z[receiver]);
-  std::uint64_t* mask = receivers.masks.data() + receiver * receivers.words;
+  std::uint64_t* mask = receivers.mask(receiver);
   bool added = false;
   for (std::size_t word = 0; word < receivers.words; word += 16) {
-    const std::uint64_t open =
+    std::uint64_t open =
         OpenGroups(samples.valid.data(), mask, word, std::min<std::size_t>(16, receivers.words - word));
+    if (active != nullptr) open &= active[word / 16];
     const GroupBits groups = TestGroups(planes, samples, groups_at + 4 * word, open);
     for (std::uint64_t rest = groups.possible; rest != 0; rest &= rest - 1) {
       const std::size_t g = 4 * word + static_cast<std::size_t>(std::countr_zero(rest)), first = g * kGroup;
@@ -269,7 +322,7 @@ HWY_INLINE void TestCandidate(const Blocker& blocker, const KernelSamples& sampl
   const bool own_plane = !(below ? blocker.all_below : blocker.all_above);
   ++counters.pairs_sampled;
   if (((batch.covered >> lane) & 1) != 0 && !unknown && !own_plane && !blocker.perforated) {
-    std::copy(samples.valid.begin(), samples.valid.end(), receivers.masks.begin() + receiver * receivers.words);
+    std::copy(samples.valid.begin(), samples.valid.end(), receivers.mask(receiver));
     receivers.open[receiver] = 0;
     ++counters.pairs_necessary;
     return;

@@ -9,6 +9,7 @@
 #include "shadows/closed_components.h"
 #include "shadows/exact_kernel.h"
 #include "shadows/light_view.h"
+#include "shadows/morton_order.h"
 #include "shadows/solver.h"
 
 namespace halfshade {
@@ -17,37 +18,14 @@ namespace {
 constexpr std::size_t kCluster = 64;  // receivers that share a list of leaves
 constexpr std::size_t kClustersPerTask = 8;
 
-/// 10 bits of x with two zero bits between each.
-std::uint32_t spread_bits(std::uint32_t x) {
-  x = (x | x << 16) & 0x030000ffu;
-  x = (x | x << 8) & 0x0300f00fu;
-  x = (x | x << 4) & 0x030c30c3u;
-  return (x | x << 2) & 0x09249249u;
-}
-
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
 constexpr double kGrazing = 1e-5;
 
 /// Receivers in front of the light on its z > 0 side, in Morton order of their positions, so that runs are compact.
 std::vector<std::uint32_t> order_receivers(const ReceiverArray& receivers, const LightFrame& frame) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> keys;
-  keys.reserve(receivers.size());
-  vec3 low(2.0f), high(-2.0f);
-  for (const vec3& p : receivers.position) low = glm::min(low, p), high = glm::max(high, p);
-  const vec3 scale = 1023.0f / glm::max(high - low, vec3(1e-30f));
-  for (std::uint32_t i = 0; i < receivers.size(); ++i) {
-    if (!(frame.to_frame(dvec3(receivers.position[i])).z > kGrazing)) continue;
-    const vec3 q = (receivers.position[i] - low) * scale;
-    const std::uint32_t code = spread_bits(static_cast<std::uint32_t>(q.x)) |
-                               spread_bits(static_cast<std::uint32_t>(q.y)) << 1 |
-                               spread_bits(static_cast<std::uint32_t>(q.z)) << 2;
-    keys.emplace_back(code, i);
-  }
-  parallel_sort(keys, [](const auto& a, const auto& b) { return a < b; });
-  std::vector<std::uint32_t> order;
-  order.reserve(keys.size());
-  for (const auto& key : keys) order.push_back(key.second);
-  return order;
+  return morton_order(receivers.position, [&](std::uint32_t i) {
+    return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing;
+  });
 }
 
 /// Bins over the bounding rectangle of all sets.
@@ -119,8 +97,8 @@ void add_counters(const std::vector<ExactScratch>& scratches, ShadowStats& stats
 
 /// All receivers on one side of the light.
 void solve_side(const LatticeMesh& mesh, const ReceiverArray& receivers, const KernelSamples& samples,
-                const LightFrame& frame, const ShadowConfig& config, BlockerTree& tree, VisibilityMasks& masks,
-                ShadowStats& stats) {
+                const SampleRows& rows, const LightFrame& frame, const ShadowConfig& config, BlockerTree& tree,
+                VisibilityMasks& masks, ShadowStats& stats) {
   Stopwatch watch;
   const std::vector<std::uint32_t> order = order_receivers(receivers, frame);
   if (order.empty()) return;
@@ -129,7 +107,8 @@ void solve_side(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
   refit_blocker_tree(mesh, samples, frame, tree);
   const SampleRectangles rectangles = make_rectangles(samples, frame);
   stats.cull_ms += watch.lap();
-  const ExactScene scene{&tree, &samples, &rectangles, frame};
+  const ExactScene scene{&tree, &samples, &rectangles, &rows, frame};
+  const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch> scratches(kTasksPerRound);
@@ -138,7 +117,7 @@ void solve_side(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
       const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
       for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
-        solve_cluster(scene, begin, std::min(task_end, begin + kCluster), kernel, scratches[t]);
+        solve(scene, begin, std::min(task_end, begin + kCluster), kernel, scratches[t]);
       }
     });
   }
@@ -180,18 +159,20 @@ void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
   masks.reset(receivers.size(), samples.count);
   if (mesh.triangles.empty()) return;
   const LightBound bound = make_light_bound(light, samples);
-  KernelSamples kernel_samples = make_kernel_samples(samples, bound);
+  const LightFrame front{dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
+  KernelSamples kernel_samples = make_kernel_samples(samples, bound, SampleOrder::kAsGiven);
+  const SampleRows rows = find_sample_rows(samples, kernel_samples, front);
+  if (rows.empty()) kernel_samples = make_kernel_samples(samples, bound);
   ClosedComponents closed;
-  certify(mesh, config, closed, kernel_samples, stats);
+  certify(mesh, receivers, config, closed, kernel_samples, stats);
   BlockerTree tree;
   build_blocker_tree(mesh, tree);
   stats.build_ms += watch.lap();
-  const LightFrame front{dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
-  solve_side(mesh, receivers, kernel_samples, front, config, tree, masks, stats);
+  solve_side(mesh, receivers, kernel_samples, rows, front, config, tree, masks, stats);
   solve_grazing(mesh, receivers, light, samples, front, config, masks, stats);
   if (samples.one_sided) return;
   const LightFrame back{front.origin, front.u, front.v, -front.n};
-  solve_side(mesh, receivers, kernel_samples, back, config, tree, masks, stats);
+  solve_side(mesh, receivers, kernel_samples, rows, back, config, tree, masks, stats);
 }
 
 }  // namespace halfshade

@@ -1,7 +1,7 @@
 // Hot loop of the exact engine: one cluster of receivers against a tree of blockers.
 #pragma once
 
-#include "shadows/blocker_tree.h"
+#include "shadows/sample_rows.h"
 
 namespace halfshade {
 
@@ -23,6 +23,7 @@ struct ExactScene {
   const BlockerTree* tree = nullptr;
   const KernelSamples* samples = nullptr;
   const SampleRectangles* rectangles = nullptr;
+  const SampleRows* rows = nullptr;  // where the samples have rows
   LightFrame frame;
 };
 
@@ -38,5 +39,9 @@ struct ExactScratch {
 /// Solves receivers [begin, end), which should lie near each other. All in front of the light (z > 0 in its frame).
 void solve_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                    ExactScratch& scratch);
+
+/// The same for samples in rows (scene.rows), which must be in sample order.
+void solve_row_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+                       ExactScratch& scratch);
 
 }  // namespace halfshade

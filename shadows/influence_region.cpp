@@ -12,14 +12,9 @@ constexpr double kPad = 1e-9;
 double padded_low(double slope, double pad) { return slope - pad - kPad * (1.0 + std::fabs(slope)); }
 double padded_high(double slope, double pad) { return slope + pad + kPad * (1.0 + std::fabs(slope)); }
 
-struct Polygon {
-  std::array<dvec3, 4> corner;
-  int count = 0;
-};
-
 /// Part of the triangle with z >= depth (keep_far) or z <= depth.
-Polygon clip_at_depth(const std::array<dvec3, 3>& t, double depth, bool keep_far) {
-  Polygon result;
+ProjectedBlocker clip_at_depth(const std::array<dvec3, 3>& t, double depth, bool keep_far) {
+  ProjectedBlocker result;
   for (int i = 0; i < 3; ++i) {
     const dvec3 &p = t[i], &q = t[(i + 1) % 3];
     const bool p_in = keep_far ? p.z >= depth : p.z <= depth, q_in = keep_far ? q.z >= depth : q.z <= depth;
@@ -37,7 +32,7 @@ Polygon clip_at_depth(const std::array<dvec3, 3>& t, double depth, bool keep_far
 /// box against the box of all such segments up to that depth.
 bool near_part_matters(const LightView& view, const std::array<dvec3, 3>& corners) {
   const double depth = view.clip_z, reach = view.light_depth;
-  const Polygon near = clip_at_depth(corners, depth, false);
+  const ProjectedBlocker near = clip_at_depth(corners, depth, false);
   if (near.count == 0) return false;
   dvec3 low(HUGE_VAL), high(-HUGE_VAL);
   for (int i = 0; i < near.count; ++i) low = glm::min(low, near.corner[i]), high = glm::max(high, near.corner[i]);
@@ -63,7 +58,7 @@ dvec2 far_image(const LightView& view, const dvec3& v, const dvec3& l) {
   return (dvec2(l) + t * (dvec2(v) - dvec2(l))) / view.far_z;
 }
 
-/// Hexagon around the circle that a spherical light shows to v: the silhouette lies in a plane across the line to v.
+/// Polygon around the circle that a spherical light shows to v: the silhouette lies in a plane across the line to v.
 /// For an ellipsoid this happens in the space where it is a ball; lines through v stay lines on the way there and back.
 void add_ball_images(const LightView& view, const dvec3& v, std::vector<dvec2>& points) {
   const dvec3 toward = view.ball.to_ball * v;
@@ -72,13 +67,9 @@ void add_ball_images(const LightView& view, const dvec3& v, std::vector<dvec2>& 
   const dvec3 a = glm::normalize(std::fabs(w.x) < 0.6 ? dvec3(0, w.z, -w.y) : dvec3(-w.z, 0, w.x)),
               b = glm::cross(w, a);
   const double ring = radius * std::sqrt(std::max(0.0, 1.0 - radius * radius / (distance * distance)));
-  const double reach = ring * 1.1547005383792517;  // circumscribed: 1 / cos 30 degrees
   const dvec3 middle = w * (radius * radius / distance);
-  constexpr double kHalf = 0.5, kHigh = 0.8660254037844387;
-  const std::array<dvec2, 6> hexagon = {dvec2(1, 0),  dvec2(kHalf, kHigh),   dvec2(-kHalf, kHigh),
-                                        dvec2(-1, 0), dvec2(-kHalf, -kHigh), dvec2(kHalf, -kHigh)};
-  for (const dvec2& h : hexagon) {
-    points.push_back(far_image(view, v, view.ball.from_ball * (middle + (a * h.x + b * h.y) * reach)));
+  for (const dvec2& h : view.ball_ring) {
+    points.push_back(far_image(view, v, view.ball.from_ball * (middle + (a * h.x + b * h.y) * ring)));
   }
 }
 
@@ -91,16 +82,14 @@ double thickness_pad(const LightView& view, const dvec3& v) {
 }
 
 /// Corners' own images and the light's bound through them; returns the pad that the bound needs.
-double collect_points(const LightView& view, const Polygon& polygon, std::vector<dvec2>& points) {
+double collect_points(const LightView& view, const ProjectedBlocker& polygon, std::vector<dvec2>& points) {
   points.clear();
   double pad = 0.0;
   for (int i = 0; i < polygon.count; ++i) {
     const dvec3& v = polygon.corner[i];
     points.push_back(dvec2(v) / v.z);
     if (v.z >= view.far_z) continue;  // beyond every receiver: only its own image bounds the part in front
-    if (view.ball.radius > 0.0) add_ball_images(view, v, points);
-    for (const dvec3& l : view.light_points) points.push_back(far_image(view, v, l));
-    if (view.flat) pad = std::max(pad, thickness_pad(view, v));
+    pad = std::max(pad, add_far_images(view, v, points));
   }
   return pad;
 }
@@ -163,20 +152,71 @@ void convex_hull(std::vector<dvec2>& points, std::vector<dvec2>& hull) {
   if (hull.size() > 1) hull.pop_back();
 }
 
-void find_influence_region(const LightView& view, const std::array<dvec3, 3>& corners, InfluenceRegion& region) {
-  region.kind = InfluenceRegion::Kind::kNowhere;
+namespace {
+
+/// The hull between the two directions' extents: a rectangle with a side along `along` (unit).
+void box_around(const std::vector<dvec2>& hull, const dvec2& along, std::array<dvec2, 4>& box) {
+  const dvec2 across(-along.y, along.x);
+  dvec2 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const dvec2& p : hull) {
+    const dvec2 q(glm::dot(p, along), glm::dot(p, across));
+    low = glm::min(low, q), high = glm::max(high, q);
+  }
+  const dvec2 pad(1e-14 * std::max({std::fabs(low.x), std::fabs(low.y), std::fabs(high.x), std::fabs(high.y)}));
+  low -= pad, high += pad;  // rotating rounds
+  box = {along * low.x + across * low.y, along * high.x + across * low.y, along * high.x + across * high.y,
+         along * low.x + across * high.y};
+}
+
+/// Replaces the hull by its box, or by the smallest rectangle around it, which has a side along one of its edges.
+void coarsen(InfluenceOutline outline, std::vector<dvec2>& hull) {
+  std::array<dvec2, 4> best, box;
+  box_around(hull, dvec2(1.0, 0.0), best);
+  const auto area = [](const std::array<dvec2, 4>& b) { return glm::length(b[1] - b[0]) * glm::length(b[3] - b[0]); };
+  for (std::size_t i = 0; outline == InfluenceOutline::kQuad && i < hull.size(); ++i) {
+    const dvec2 edge = hull[(i + 1) % hull.size()] - hull[i];
+    const double length = glm::length(edge);
+    if (!(length > 0.0)) continue;
+    box_around(hull, edge / length, box);
+    if (area(box) < area(best)) best = box;
+  }
+  hull.assign(best.begin(), best.end());
+}
+
+}  // namespace
+
+ProjectedBlocker clip_blocker(const LightView& view, const std::array<dvec3, 3>& corners) {
+  ProjectedBlocker polygon;
   const double nearest = std::min({corners[0].z, corners[1].z, corners[2].z});
   const double farthest = std::max({corners[0].z, corners[1].z, corners[2].z});
-  if (nearest > view.far_z * (1.0 + kPad)) return;
+  if (nearest > view.far_z * (1.0 + kPad)) return polygon;
   if (nearest < view.clip_z && near_part_matters(view, corners)) {
-    region.kind = InfluenceRegion::Kind::kEverywhere;
-    return;
+    polygon.kind = InfluenceRegion::Kind::kEverywhere;
+    return polygon;
   }
-  if (farthest < view.clip_z) return;
-  Polygon polygon{{corners[0], corners[1], corners[2], dvec3(0.0)}, 3};
+  if (farthest < view.clip_z) return polygon;
+  polygon = {{}, {corners[0], corners[1], corners[2], dvec3(0.0)}, 3};
   if (nearest < view.clip_z) polygon = clip_at_depth(corners, view.clip_z, true);
+  polygon.kind = InfluenceRegion::Kind::kRows;
+  return polygon;
+}
+
+double add_far_images(const LightView& view, const dvec3& v, std::vector<dvec2>& points) {
+  if (view.ball.radius > 0.0) add_ball_images(view, v, points);
+  for (const dvec3& l : view.light_points) points.push_back(far_image(view, v, l));
+  return view.flat ? thickness_pad(view, v) : 0.0;
+}
+
+void find_influence_region(const LightView& view, const std::array<dvec3, 3>& corners, InfluenceRegion& region) {
+  const ProjectedBlocker polygon = clip_blocker(view, corners);
+  region.kind = polygon.kind;
+  if (polygon.kind != InfluenceRegion::Kind::kRows) return;
+  region.kind = InfluenceRegion::Kind::kNowhere;
   const double pad = collect_points(view, polygon, region.points);
   convex_hull(region.points, region.hull);
+  if (view.outline == InfluenceOutline::kBox || view.outline == InfluenceOutline::kQuad) {
+    coarsen(view.outline, region.hull);
+  }
   scan_convert(view, pad, region);
 }
 

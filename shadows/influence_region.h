@@ -31,8 +31,35 @@ struct InfluenceRegion {
   std::vector<dvec2> extent;        // scratch
 };
 
+/// The part of a blocker that a grid can hold, or why there is none.
+struct ProjectedBlocker {
+  InfluenceRegion::Kind kind = InfluenceRegion::Kind::kNowhere;
+  std::array<dvec3, 4> corner;  // kRows: the part beyond view.clip_z
+  int count = 0;
+};
+
+/// `corners` are the blocker's vertices in view coordinates.
+ProjectedBlocker clip_blocker(const LightView& view, const std::array<dvec3, 3>& corners);
+
+/// Slopes at which the rays from the light's bound through v end on the far plane; requires clip_z <= v.z < far_z.
+/// Returns how far outside the hull of all these points (in slopes) a ray's end can lie.
+double add_far_images(const LightView& view, const dvec3& v, std::vector<dvec2>& points);
+
 /// `corners` are the blocker's vertices in view coordinates.
 void find_influence_region(const LightView& view, const std::array<dvec3, 3>& corners, InfluenceRegion& region);
+
+/// Calls run(row, first column, last column) for each run of cells of the region.
+template <class Run>
+void for_each_run(const LightView& view, const InfluenceRegion& region, const Run& run) {
+  if (region.kind == InfluenceRegion::Kind::kEverywhere) {
+    for (std::uint32_t row = 0; row < view.grid.rows; ++row) run(row, 0u, view.grid.columns - 1);
+  }
+  if (region.kind != InfluenceRegion::Kind::kRows) return;
+  for (std::size_t i = 0; i < region.rows.size(); ++i) {
+    const RowSpan& row = region.rows[i];
+    if (row.first <= row.last) run(region.first_row + static_cast<std::uint32_t>(i), row.first, row.last);
+  }
+}
 
 /// Convex hull, counter-clockwise, by Graham's scan in Andrew's left-to-right order. Sorts `points`.
 void convex_hull(std::vector<dvec2>& points, std::vector<dvec2>& hull);

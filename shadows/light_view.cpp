@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/unit_circle.h"
 
 namespace halfshade {
 namespace {
@@ -102,25 +103,70 @@ std::size_t view_of(const std::vector<LightView>& views, const dvec3& p) {
   return best;
 }
 
-void set_light(const LightBound& bound, const LightSamples& samples, LightView& view) {
+/// Corners of the bounding polygons of section 4.1, if the outline asks for them.
+int ring_corners(InfluenceOutline outline) {
+  switch (outline) {
+    case InfluenceOutline::kHexagon:
+      return 6;
+    case InfluenceOutline::kOctagon:
+      return 8;
+    case InfluenceOutline::kDodecagon:
+      return 12;
+    default:
+      return 0;
+  }
+}
+
+/// Regular polygon around the circle of that radius.
+std::vector<dvec2> ring_around(int corners, double radius) {
+  const double reach = radius / unit_circle(0.5 / corners).x;
+  std::vector<dvec2> ring;
+  for (int k = 0; k < corners; ++k) ring.push_back(unit_circle(double(k) / corners) * (reach * kWiden));
+  return ring;
+}
+
+void set_flat_light(const LightBound& bound, const LightSamples& samples, int corners, LightView& view) {
+  std::vector<dvec2> outline = bound.outline;
+  if (corners != 0) {  // around the disk that holds the light
+    double radius = 0.0;
+    for (const dvec2& p : outline) radius = std::max(radius, glm::length(p));
+    outline = ring_around(corners, radius);
+  }
+  for (const dvec2& p : outline) {
+    const dvec3 q = view.to_view(view.origin + samples.axis_u * p.x + samples.axis_v * p.y);
+    view.light_points.emplace_back(q.x, q.y, 0.0);
+  }
+  view.light_depth = glm::length(bound.half_axes[2]);
+}
+
+void set_box_light(const LightBound& bound, LightView& view) {
+  for (int corner = 0; corner < 8; ++corner) {
+    dvec3 p = view.origin;
+    for (int k = 0; k < 3; ++k) p += bound.half_axes[k] * ((corner >> k) & 1 ? 1.0 : -1.0);
+    view.light_points.push_back(view.to_view(p));
+    view.light_depth = std::max(view.light_depth, std::fabs(view.light_points.back().z));
+  }
+}
+
+void set_light(const LightBound& bound, const LightSamples& samples, InfluenceOutline outline, LightView& view) {
+  const int corners = ring_corners(outline);
   view.flat = bound.flat;
-  if (bound.ball.radius > 0.0) {
+  view.outline = outline;
+  BallBound ball = bound.ball;
+  if (!bound.flat && corners != 0 && !(ball.radius > 0.0)) {  // any other light is taken for a sphere
+    for (const vec3& l : samples.points) {
+      ball.radius = std::max(ball.radius, glm::length(dvec3(l) - dvec3(bound.center)) * kWiden);
+    }
+  }
+  if (bound.flat) {
+    set_flat_light(bound, samples, corners, view);
+  } else if (ball.radius > 0.0) {
     const glm::dmat3 from_view(view.x, view.y, view.z);
-    view.ball = {bound.ball.radius, glm::transpose(from_view) * bound.ball.from_ball, bound.ball.to_ball * from_view};
+    view.ball = {ball.radius, glm::transpose(from_view) * ball.from_ball, ball.to_ball * from_view};
+    view.ball_ring = ring_around(corners != 0 ? corners : 6, 1.0);
     view.light_depth = 1.2 * view.ball.reach().z;  // a hexagon around the silhouette reaches 1.155 radii
-  } else if (bound.flat) {
-    for (const dvec2& p : bound.outline) {
-      const dvec3 q = view.to_view(view.origin + samples.axis_u * p.x + samples.axis_v * p.y);
-      view.light_points.emplace_back(q.x, q.y, 0.0);
-    }
-    view.light_depth = glm::length(bound.half_axes[2]);
   } else {
-    for (int corner = 0; corner < 8; ++corner) {
-      dvec3 p = view.origin;
-      for (int k = 0; k < 3; ++k) p += bound.half_axes[k] * ((corner >> k) & 1 ? 1.0 : -1.0);
-      view.light_points.push_back(view.to_view(p));
-      view.light_depth = std::max(view.light_depth, std::fabs(view.light_points.back().z));
-    }
+    set_box_light(bound, view);
   }
 }
 
@@ -137,6 +183,20 @@ void fit_receivers(const std::vector<dvec3>& points, LightView& view) {
     view.has_receivers = true;
     view.receiver_low = glm::min(view.receiver_low, p);
     view.receiver_high = glm::max(view.receiver_high, p);
+    view.slope_low = glm::min(view.slope_low, dvec2(p) / p.z);
+    view.slope_high = glm::max(view.slope_high, dvec2(p) / p.z);
+  }
+}
+
+/// Undoes part of the fit of section 4.3: depth range and slopes reach over whole meshes. For measuring.
+void widen(const LightViewOptions& options, LightView& view) {
+  if (options.far_over != nullptr) {
+    for (const vec3& p : options.far_over->positions) view.far_z = std::max(view.far_z, view.to_view(dvec3(p)).z);
+  }
+  if (options.grid_over == nullptr) return;
+  for (const vec3& vertex : options.grid_over->positions) {
+    const dvec3 p = view.to_view(dvec3(vertex));
+    if (view.too_near(p)) continue;
     view.slope_low = glm::min(view.slope_low, dvec2(p) / p.z);
     view.slope_high = glm::max(view.slope_high, dvec2(p) / p.z);
   }
@@ -207,7 +267,8 @@ LightBound make_light_bound(const Light& light, const LightSamples& samples) {
 }
 
 std::vector<LightViewCells> make_light_views(const LightBound& bound, const LightSamples& samples,
-                                             const ReceiverArray& receivers, std::uint32_t resolution) {
+                                             const ReceiverArray& receivers, std::uint32_t resolution,
+                                             const LightViewOptions& options) {
   const std::vector<LightView> views = make_directions(bound, samples);
   std::vector<std::uint8_t> holder(receivers.size());
   parallel_ranges(receivers.size(), 8192, [&](std::size_t begin, std::size_t end) {
@@ -223,8 +284,9 @@ std::vector<LightViewCells> make_light_views(const LightBound& bound, const Ligh
     }
     if (points.empty()) continue;
     LightViewCells cells{views[k], std::vector<std::uint32_t>(receivers.size(), kNone)};
-    set_light(bound, samples, cells.view);
+    set_light(bound, samples, options.outline, cells.view);
     fit_receivers(points, cells.view);
+    widen(options, cells.view);
     fit_grid(resolution != 0 ? resolution : choose_resolution(points.size()), cells.view);
     for (std::size_t i = 0, next = 0; i < holder.size(); ++i) {
       if (holder[i] != k) continue;

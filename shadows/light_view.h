@@ -11,6 +11,7 @@
 
 #include <glm/mat3x3.hpp>
 
+#include "halfshade/methods.h"
 #include "shadows/receivers.h"
 
 namespace halfshade {
@@ -57,6 +58,8 @@ struct LightView {
   dvec3 origin{0.0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};  // local frame; orthonormal, looking along +z
   std::vector<dvec3> light_points;                        // vertices of the light's bound in view coordinates
   BallBound ball;                                         // in view coordinates: if there is one, it is the bound
+  std::vector<dvec2> ball_ring;                           // polygon around the unit circle, for the ball's silhouette
+  InfluenceOutline outline = InfluenceOutline::kHull;
   bool flat = false;                 // light_points lie in z = 0; the samples within light_depth of it
   double light_depth = 0.0;          // max |z| of the light's bound
   double near_z = 0.0, far_z = 0.0;  // receivers on the grid have near_z <= z <= far_z
@@ -83,9 +86,17 @@ struct LightViewCells {
   std::uint32_t near_cell() const { return view.grid.columns * view.grid.rows; }
 };
 
+/// How the views are laid out.
+struct LightViewOptions {
+  InfluenceOutline outline = InfluenceOutline::kHull;
+  const LatticeMesh* grid_over = nullptr;  // grid over the slopes of this mesh too, not of the receivers alone
+  const LatticeMesh* far_over = nullptr;   // far plane beyond this mesh too
+};
+
 /// Views that together hold every receiver exactly once; views without receivers are left out.
 /// `resolution` 0 chooses the grid from the number of receivers.
 std::vector<LightViewCells> make_light_views(const LightBound& bound, const LightSamples& samples,
-                                             const ReceiverArray& receivers, std::uint32_t resolution);
+                                             const ReceiverArray& receivers, std::uint32_t resolution,
+                                             const LightViewOptions& options = {});
 
 }  // namespace halfshade

@@ -16,6 +16,9 @@ struct MethodOption {
 /// All of them, by method.
 std::span<const MethodOption> method_options();
 
+/// Does the method read that option? Those named "map." belong to all methods that look into shadow maps.
+bool concerns(const MethodOption& option, ShadowMethod method);
+
 /// `assignment` is "name=value". Throws Error{kUsage}.
 void set_method_option(ShadowConfig& config, const std::string& assignment);
 

@@ -4,7 +4,17 @@
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/alias_free_shadow_map.h"
 #include "shadows/exact_engine.h"
+#include "shadows/gears.h"
+#include "shadows/hierarchical_penumbra_casting.h"
+#include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
+#include "shadows/percentage_closer.h"
+#include "shadows/receiver_request.h"
+#include "shadows/shadow_accumulation.h"
+#include "shadows/shadow_map.h"
+#include "shadows/shadow_map_per_sample.h"
+#include "shadows/soft_textured_shadow_volumes.h"
+#include "shadows/transmittance.h"
 
 namespace halfshade {
 namespace {
@@ -45,20 +55,24 @@ const Entry& entry_of(const Entry (&table)[n], const std::string& name, const ch
   throw Error(ErrorCode::kUsage, std::string(what) + " '" + name + "' is not one of: " + known);
 }
 
-void check_finite(std::span<const Receiver> receivers) {
-  for (std::size_t i = 0; i < receivers.size(); ++i) {
-    if (!is_finite(receivers[i].position_world)) {
-      throw Error(ErrorCode::kBadInput, "receiver " + std::to_string(i) + ": the position is not finite");
-    }
-  }
-}
-
 }  // namespace
 
 std::span<const MethodTraits> shadow_methods() { return kMethods; }
 const MethodTraits& traits_of(ShadowMethod method) { return kMethods[static_cast<std::size_t>(method)]; }
 ShadowMethod shadow_method_from_name(const std::string& name) { return entry_of(kMethods, name, "method").method; }
 SamplePattern sample_pattern_from_name(const std::string& name) { return entry_of(kPatterns, name, "pattern").value; }
+bool yields_masks(const ShadowConfig& config) {
+  const bool filtered = config.method == ShadowMethod::kSoftTexturedShadowVolumes &&
+                        config.stsv.filter == OpacityFilter::kFiltered;
+  return traits_of(config.method).masks && !filtered;
+}
+
+bool promises_exactness(const ShadowConfig& config) {
+  const bool filtered = config.method == ShadowMethod::kSoftTexturedShadowVolumes &&
+                        config.stsv.filter == OpacityFilter::kFiltered;
+  return traits_of(config.method).exact && !filtered;
+}
+
 const char* name_of(ShadowMethod method) { return traits_of(method).name; }
 const char* name_of(SamplePattern pattern) { return kPatterns[static_cast<std::size_t>(pattern)].name; }
 
@@ -66,18 +80,40 @@ void report_progress(const ShadowConfig& config, double done) {
   if (config.progress && !config.progress(done)) throw Error(ErrorCode::kCancelled, "cancelled");
 }
 
-void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
-  const FpEnvironment environment;
+namespace {
+
+void begin_stats(const OpaqueMesh& opaque, const ReceiverArray& receivers, ShadowStats& stats) {
   stats = {};
   stats.receivers = receivers.size();
-  stats.triangles = mesh.triangles.size();
+  stats.triangles = opaque.get().triangles.size();
+  if (opaque.translucent() == 0) return;
+  stats.details.emplace_back("translucent_triangles", static_cast<double>(opaque.translucent()));
+}
+
+}  // namespace
+
+void solve_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,
+                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
+  const FpEnvironment environment;
+  const OpaqueMesh opaque(scene_mesh);
+  const LatticeMesh& mesh = opaque.get();
+  begin_stats(opaque, receivers, stats);
   switch (config.method) {
     case ShadowMethod::kAliasFreeShadowMap:
+    case ShadowMethod::kAliasFreeLookupTable:
       solve_alias_free_shadow_map(mesh, receivers, light, samples, config, masks, stats);
       break;
     case ShadowMethod::kExact:
       solve_exact(mesh, receivers, light, samples, config, masks, stats);
+      break;
+    case ShadowMethod::kHierarchicalPenumbraCasting:
+      solve_hierarchical_penumbra_casting(mesh, receivers, light, samples, config, masks, stats);
+      break;
+    case ShadowMethod::kGears:
+      solve_gears(mesh, receivers, light, samples, config, masks, stats);
+      break;
+    case ShadowMethod::kSoftTexturedShadowVolumes:
+      solve_soft_textured_shadow_volumes(mesh, receivers, light, samples, config, masks, stats);
       break;
     case ShadowMethod::kOracle: {
       Stopwatch watch;
@@ -85,14 +121,79 @@ void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
       stats.test_ms = watch.lap();
       break;
     }
+    case ShadowMethod::kShadowMapPerSample:
+      solve_shadow_maps(mesh, receivers, samples, config, masks, stats);
+      break;
+    case ShadowMethod::kRaytrace:
+      throw Error(ErrorCode::kUsage,
+                  "method 'raytrace' is not part of the core library: solve_raytrace (shadows/raytrace) has it");
     default:
       throw Error(ErrorCode::kUsage, std::string("method '") + name_of(config.method) + "' yields no masks");
+  }
+}
+
+namespace {
+
+void solve_without_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,
+                         const LightSamples& samples, const ShadowConfig& config, std::vector<float>& visibility,
+                         ShadowStats& stats) {
+  const FpEnvironment environment;
+  const OpaqueMesh opaque(scene_mesh);
+  const LatticeMesh& mesh = opaque.get();
+  begin_stats(opaque, receivers, stats);
+  switch (config.method) {
+    case ShadowMethod::kSoftTexturedShadowVolumes:
+      solve_filtered_shadow_volumes(mesh, receivers, light, samples, config, visibility, stats);
+      break;
+    case ShadowMethod::kShadowAccumulation:
+      solve_shadow_accumulation(mesh, receivers, light, samples, config, visibility, stats);
+      break;
+    case ShadowMethod::kPercentageCloserFiltering:
+      solve_pcf(mesh, receivers, samples, config, visibility, stats);
+      break;
+    case ShadowMethod::kPercentageCloserSoftShadows:
+      solve_pcss(mesh, receivers, light, samples, config, visibility, stats);
+      break;
+    default:
+      solve_shadow_map(mesh, receivers, samples, config, visibility, stats);
+  }
+}
+
+}  // namespace
+
+std::string method_assumptions(const ShadowConfig& config, const Light& light) {
+  switch (config.method) {
+    case ShadowMethod::kAliasFreeLookupTable:
+      return assumptions_of_lookup_table(config);
+    case ShadowMethod::kSoftTexturedShadowVolumes:
+      return promises_exactness(config) ? std::string()
+                                        : "each light sample is dimmed by the average opacity of its cell's footprint "
+                                          "on a perforated triangle; footprints are boxes along the texture's axes";
+    case ShadowMethod::kShadowAccumulation:
+      return assumptions_of_shadow_accumulation(config, light);
+    case ShadowMethod::kShadowMap:
+      return assumptions_of_shadow_map(config);
+    case ShadowMethod::kPercentageCloserFiltering:
+      return assumptions_of_pcf(config);
+    case ShadowMethod::kPercentageCloserSoftShadows:
+      return assumptions_of_pcss(config, light);
+    case ShadowMethod::kShadowMapPerSample:
+      return assumptions_of_shadow_maps(config);
+    case ShadowMethod::kRaytrace:
+      return std::string("float rays of Embree, ") + (config.raytrace.robust ? "robust" : "fast") +
+             " mode: hits near edges may go either way, a receiver's own triangle counts";
+    default:
+      return {};
   }
 }
 
 void solve_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                       const LightSamples& samples, const ShadowConfig& config, std::vector<float>& visibility,
                       ShadowStats& stats) {
+  if (!yields_masks(config)) {
+    solve_without_masks(mesh, receivers, light, samples, config, visibility, stats);
+    return;
+  }
   VisibilityMasks masks;
   solve_masks(mesh, receivers, light, samples, config, masks, stats);
   visibility.resize(receivers.size());
@@ -102,32 +203,14 @@ void solve_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, c
 namespace {
 
 /// Explicit receivers, on the lattice; `unlit` are those behind a one-sided light.
-struct Request {
+struct Request : ReceiverRequest {
   LatticeMesh mesh;
-  LightSamples samples;
-  ReceiverArray receivers;
-  std::vector<std::uint32_t> unlit;
 };
 
 Request make_request(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                      const ShadowConfig& config) {
-  check_finite(receivers);
-  std::vector<dvec3> reach = light_extent(light);
-  for (const Receiver& r : receivers) reach.push_back(r.position_world);
-  Request q;
-  q.mesh = make_lattice_mesh(scene, make_local_frame(scene.positions, reach));
-  q.samples = make_light_samples(light, config, q.mesh.frame);
-  for (std::uint32_t i = 0; i < receivers.size(); ++i) {
-    const vec3 position = q.mesh.frame.to_lattice(receivers[i].position_world);
-    if (q.samples.one_sided && glm::dot(dvec3(position) - q.samples.center, q.samples.axis_n) <= 0.0) {
-      q.unlit.push_back(i);
-    } else {
-      const std::uint32_t set =
-          q.samples.interleaved ? i % kInterleavedSets : receiver_set(i, config.seed, q.samples.sets);
-      q.receivers.push_back(position, vec3(0.0f), receivers[i].triangle, i, static_cast<std::uint8_t>(set));
-    }
-  }
-  return q;
+  const LocalFrame frame = make_local_frame(scene.positions, receiver_reach(receivers, light));
+  return {make_receiver_request(frame, receivers, light, config), make_lattice_mesh(scene, frame)};
 }
 
 }  // namespace
@@ -139,15 +222,20 @@ void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, cons
   ShadowStats own;
   VisibilityMasks solved;
   solve_masks(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
-  masks.reset(receivers.size(), q.samples.count);
+  spread_masks(q, solved, receivers.size(), masks);
+}
+
+void solve_depth_complexity(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                            const ShadowConfig& config, DepthComplexity& counts, ShadowStats* stats) {
+  const FpEnvironment environment;
+  const Request q = make_request(scene, receivers, light, config);
+  ShadowStats own;
+  DepthComplexity solved;
+  count_depth_complexity(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
+  counts = {receivers.size(), q.samples.count, std::vector<std::uint32_t>(receivers.size() * q.samples.count, 1)};
   for (std::size_t i = 0; i < q.receivers.size(); ++i) {
-    std::copy_n(solved.mask(i).begin(), masks.words_per_receiver,
-                masks.words.begin() + q.receivers.sample[i] * masks.words_per_receiver);
-  }
-  for (const std::uint32_t i : q.unlit) {
-    for (std::uint32_t s = 0; s < q.samples.count; ++s) {
-      masks.words[i * masks.words_per_receiver + s / 64] |= std::uint64_t{1} << (s % 64);
-    }
+    std::copy_n(solved.counts.begin() + static_cast<std::ptrdiff_t>(i * q.samples.count), q.samples.count,
+                counts.counts.begin() + static_cast<std::ptrdiff_t>(q.receivers.sample[i] * q.samples.count));
   }
 }
 
@@ -160,6 +248,25 @@ void solve_visibility(const Scene& scene, std::span<const Receiver> receivers, c
   solve_visibility(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
   visibility.assign(receivers.size(), 0.0f);
   for (std::size_t i = 0; i < solved.size(); ++i) visibility[q.receivers.sample[i]] = solved[i];
+}
+
+void solve_light(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                 const ShadowConfig& config, std::vector<vec3>& reaching, ShadowStats* stats) {
+  const FpEnvironment environment;
+  const Request q = make_request(scene, receivers, light, config);
+  ShadowStats own;
+  ShadowStats& noted = stats != nullptr ? *stats : own;
+  VisibilityMasks masks;
+  std::vector<float> visibility;
+  if (yields_masks(config)) {
+    solve_masks(q.mesh, q.receivers, light, q.samples, config, masks, noted);
+  } else {
+    solve_visibility(q.mesh, q.receivers, light, q.samples, config, visibility, noted);
+  }
+  std::vector<vec3> solved;
+  solve_reaching_light(find_panes(q.mesh), q.receivers, light, q.samples, config, masks, visibility, solved, noted);
+  reaching.assign(receivers.size(), vec3(0.0f));
+  for (std::size_t i = 0; i < solved.size(); ++i) reaching[q.receivers.sample[i]] = solved[i];
 }
 
 }  // namespace halfshade

@@ -6,7 +6,8 @@
 
 namespace halfshade {
 
-/// Masks of `receivers` under one light; fills the counters. Exact methods give equal masks. Throws Error{kUsage} for
+/// Masks of `receivers` under one light; fills the counters. Exact methods give equal masks. Translucent triangles block
+/// nothing, here and below; stats.details has their number (transmittance.h). Throws Error{kUsage} for
 /// methods without masks.
 void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats);
@@ -15,6 +16,13 @@ void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
 void solve_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                       const LightSamples& samples, const ShadowConfig& config, std::vector<float>& visibility,
                       ShadowStats& stats);
+
+/// Does the method, with its options, yield masks? Do they, or else the visibility, equal the oracle's in every bit?
+bool yields_masks(const ShadowConfig& config);
+bool promises_exactness(const ShadowConfig& config);
+
+/// What an approximate method takes for granted with this configuration and light, in one line; empty for exact ones.
+std::string method_assumptions(const ShadowConfig& config, const Light& light);
 
 /// Calls config.progress if there is one; throws Error{kCancelled} when it returns false.
 void report_progress(const ShadowConfig& config, double done);

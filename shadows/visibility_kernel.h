@@ -15,6 +15,7 @@ namespace halfshade {
 
 struct LightBound;
 struct ClosedComponents;
+class HalfPlaneTable;
 
 /// Light samples as the kernel reads them: offsets from the light's centre in an order that puts neighbours together,
 /// in groups of 16 with a bounding box each. Bit i of a mask under construction is the i-th sample of this order.
@@ -34,6 +35,7 @@ struct KernelSamples {
   std::vector<float> half_x, half_y, half_z;     // [set][group_stride] half extents, rounded up
   std::vector<std::uint64_t> valid;              // [padded / 64]: bits of real samples
 
+  const HalfPlaneTable* table = nullptr;     // afsm-lut: instead of plane tests; null = exact
   const ClosedComponents* closed = nullptr;  // certificate for back-face-only casters; null = both sides cast
   std::vector<std::uint8_t> closed_usable;   // [closed component] all samples lie outside its box
 
@@ -42,7 +44,10 @@ struct KernelSamples {
   }
 };
 
-KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound);
+enum class SampleOrder { kNeighboursTogether, kAsGiven };
+
+KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound,
+                                  SampleOrder order = SampleOrder::kNeighboursTogether);
 
 /// Lets front faces of closed components be skipped where that is certified to change no bit.
 void use_certificate(const ClosedComponents& closed, KernelSamples& samples);
@@ -58,9 +63,12 @@ struct KernelReceivers {
   std::vector<std::uint32_t> own;   // own triangle
   std::vector<std::uint32_t> open;  // all ones while some sample is not blocked yet, then zero
   std::vector<std::uint8_t> set;
-  std::vector<std::uint64_t> masks;  // [receiver][words]
+  std::vector<std::uint64_t> masks;     // [receiver][words]
+  std::vector<std::uint64_t*> mask_at;  // [receiver] -> words of its own, or empty: all of them lie in `masks`
   std::size_t words = 0;
   std::size_t count = 0;
+
+  std::uint64_t* mask(std::size_t i) { return mask_at.empty() ? masks.data() + i * words : mask_at[i]; }
 };
 
 /// A blocker and the run of receivers that it may hide from the light.
@@ -75,6 +83,7 @@ struct KernelCounters {
 
 void add_to_stats(const KernelCounters& counters, ShadowStats& stats);
 
+struct Blocker;
 struct ReceiverArray;
 
 /// Receivers as the kernels read them, in the given order, nothing blocked yet.
@@ -87,6 +96,11 @@ void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const
 /// ORs into receivers.masks what the blockers hide. Spans must stay within receivers that no other call writes.
 void test_blockers(const LatticeMesh& mesh, const KernelSamples& samples, std::span<const BlockerSpan> spans,
                    KernelReceivers& receivers, KernelCounters& counters);
+
+/// The same with blockers prepared beforehand (visibility_pair.h), for those that meet many short runs: the `triangle`
+/// of a span is an index into `blockers`.
+void test_prepared_blockers(std::span<const Blocker> blockers, const KernelSamples& samples,
+                            std::span<const BlockerSpan> spans, KernelReceivers& receivers, KernelCounters& counters);
 
 /// Same contract in plain scalar code with the exact predicate alone.
 void test_blockers_reference(const LatticeMesh& mesh, const KernelSamples& samples, std::span<const BlockerSpan> spans,

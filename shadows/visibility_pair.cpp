@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
 #include <glm/vector_relational.hpp>
 
@@ -16,22 +15,33 @@ namespace {
 float norm1(const vec3& v) { return std::fabs(v.x) + std::fabs(v.y) + std::fabs(v.z); }
 float norm_max(const vec3& v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
 
-/// Sorts sample indices so that every run of 16 is compact: halves along the longest side, at multiples of 16.
-void group_neighbours(std::span<const vec3> points, std::span<std::uint32_t> order) {
-  if (order.size() <= KernelSamples::kGroup) return;
-  vec3 low = points[order[0]], high = low;
-  for (const std::uint32_t i : order) low = glm::min(low, points[i]), high = glm::max(high, points[i]);
+/// Sorts the sample indices of every set, [set][sample], so that each run of 16 is compact: halves along the longest
+/// side, at multiples of 16. The sets are split alike, so that equal runs of different sets lie near each other.
+void group_neighbours(const LightSamples& samples, std::size_t first, std::size_t count,
+                      std::vector<std::uint32_t>& order) {
+  if (count <= KernelSamples::kGroup) return;
+  vec3 low(2.0f), high(-2.0f);
+  for (std::uint32_t set = 0; set < samples.sets; ++set) {
+    for (std::size_t i = first; i < first + count; ++i) {
+      const vec3& p = samples.set(set)[order[std::size_t{set} * samples.count + i]];
+      low = glm::min(low, p), high = glm::max(high, p);
+    }
+  }
   const vec3 extent = high - low;
   const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : (extent.y >= extent.z ? 1 : 2);
-  const std::size_t groups = (order.size() + KernelSamples::kGroup - 1) / KernelSamples::kGroup;
+  const std::size_t groups = (count + KernelSamples::kGroup - 1) / KernelSamples::kGroup;
   const std::size_t middle = groups / 2 * KernelSamples::kGroup;
-  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(middle), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) {
-                     const float x = points[a][axis], y = points[b][axis];
-                     return x != y ? x < y : a < b;
-                   });
-  group_neighbours(points, order.first(middle));
-  group_neighbours(points, order.subspan(middle));
+  for (std::uint32_t set = 0; set < samples.sets; ++set) {
+    const std::span<const vec3> points = samples.set(set);
+    const auto begin = order.begin() + static_cast<std::ptrdiff_t>(std::size_t{set} * samples.count + first);
+    std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(middle), begin + static_cast<std::ptrdiff_t>(count),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       const float x = points[a][axis], y = points[b][axis];
+                       return x != y ? x < y : a < b;
+                     });
+  }
+  group_neighbours(samples, first, middle, order);
+  group_neighbours(samples, first + middle, count - middle, order);
 }
 
 /// Bounding boxes of the groups, in offsets from the light's centre; widened so that float rounding cannot shrink them.
@@ -57,16 +67,18 @@ void add_groups(KernelSamples& kernel) {
 
 }  // namespace
 
-KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound) {
+KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound, SampleOrder sample_order) {
   KernelSamples kernel;
   kernel.count = samples.count;
   kernel.padded = (samples.count + 63) / 64 * 64;
   kernel.sets = samples.sets;
   kernel.center = bound.center;
+  std::vector<std::uint32_t> grouped(std::size_t{samples.sets} * samples.count);  // [set][sample]
+  for (std::size_t i = 0; i < grouped.size(); ++i) grouped[i] = static_cast<std::uint32_t>(i % samples.count);
+  if (sample_order == SampleOrder::kNeighboursTogether) group_neighbours(samples, 0, samples.count, grouped);
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    std::vector<std::uint32_t> order(samples.count);
-    std::iota(order.begin(), order.end(), 0u);
-    group_neighbours(samples.set(set), order);
+    const auto begin = grouped.begin() + static_cast<std::ptrdiff_t>(std::size_t{set} * samples.count);
+    std::vector<std::uint32_t> order(begin, begin + static_cast<std::ptrdiff_t>(samples.count));
     order.resize(kernel.padded, order.back());
     kernel.order.insert(kernel.order.end(), order.begin(), order.end());
     for (const std::uint32_t i : order) {

@@ -19,7 +19,13 @@ struct Paper {
 };
 
 const std::vector<Paper>& papers() {
-  static const std::vector<Paper> all = {};
+  static const std::vector<Paper> all = {
+      {"afsm", "Sintorn, Eisemann, Assarsson 2008: alias-free shadow maps", run_afsm},
+      {"gears", "Wang et al. 2014: GEARS, tables 1 to 8 against ray tracing", run_gears},
+      {"hpc", "Laine, Aila 2005: hierarchical penumbra casting, table 2 against ray tracing", run_hpc},
+      {"stsv", "Forest, Barthe, Paulin 2009: soft textured shadow volumes, a card against its mesh", run_stsv},
+      {"shadow-accumulation", "Aszodi, Szirmay-Kalos 2006: shadow accumulation against PCSS", run_shadow_accumulation},
+  };
   return all;
 }
 

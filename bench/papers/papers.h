@@ -13,6 +13,12 @@ struct PaperOptions {
   bool quick = false;  // small pictures, few rows: for trying whether it works
 };
 
+void run_gears(const PaperOptions& options);
+void run_hpc(const PaperOptions& options);
+void run_afsm(const PaperOptions& options);
+void run_stsv(const PaperOptions& options);
+void run_shadow_accumulation(const PaperOptions& options);
+
 /// Prints Markdown rows "claim | paper | ours".
 void print_claim(const std::string& claim, const std::string& paper, const std::string& ours);
 

@@ -403,6 +403,13 @@ void accumulate(const AccumulateOptions& options) {
   check_options(options);
   if (!options.output.empty()) run.pattern = parse_pattern(options.output);
   open_pipeline(options, 40.0, run);
+  if (!run.panes.empty()) {
+    fmt::print(
+        stderr,
+        "halfshade: warning: {} translucent triangles: accumulate averages visibility, which knows the opaque ones "
+        "alone; their light is neither dimmed nor coloured\n",
+        run.panes.translucent);
+  }
   prepare_state(run);
   if (options.reference_samples > 0) make_reference(run);
   while (!finished(run)) run_frame(run);

@@ -7,6 +7,7 @@
 #include "halfshade/error.h"
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/io/npy.h"
+#include "shadows/opaque_mesh.h"
 
 namespace halfshade {
 namespace {
@@ -166,9 +167,11 @@ void read_masks(const fs::path& directory, std::uint32_t samples, Dump& dump) {
 
 }  // namespace
 
-void write_dump(const fs::path& directory, const LatticeMesh& mesh, const ReceiverArray& receivers,
+void write_dump(const fs::path& directory, const LatticeMesh& scene_mesh, const ReceiverArray& receivers,
                 const std::vector<std::uint32_t>& receiver_pixels, const LightSamples& samples,
                 const VisibilityMasks& masks, const DumpLighting& lighting, nlohmann::ordered_json about) {
+  const OpaqueMesh opaque(scene_mesh);
+  const LatticeMesh& mesh = opaque.get();
   std::error_code error;
   fs::create_directories(directory, error);
   if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", directory.string(), error.message()));
@@ -192,6 +195,7 @@ void write_dump(const fs::path& directory, const LatticeMesh& mesh, const Receiv
                     {"scale", frame.scale}};
   about["counts"] = {
       {"receivers", count}, {"triangles", mesh.triangles.size()}, {"samples", samples.count}, {"sets", samples.sets}};
+  if (opaque.translucent() > 0) about["counts"]["translucent_triangles"] = opaque.translucent();
   about["mask_hash"] = masks.hash();
   write_file_atomically(directory / "dump.json", about.dump(2) + "\n");
 }

@@ -17,7 +17,8 @@ struct DumpLighting {
   std::vector<vec3> response;  // [receiver] what its pixel gains per unit of visible emission
 };
 
-/// Writes receivers, light samples, triangles, masks and dump.json into `directory`, which is created.
+/// Writes receivers, light samples, triangles, masks and dump.json into `directory`, which is created. Translucent
+/// triangles are written without area: they block nothing, and the masks do not know them.
 /// `receiver_pixels` is y * width + x of each receiver's pixel. `about` goes into dump.json as it is.
 void write_dump(const std::filesystem::path& directory, const LatticeMesh& mesh, const ReceiverArray& receivers,
                 const std::vector<std::uint32_t>& receiver_pixels, const LightSamples& samples,

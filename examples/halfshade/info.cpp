@@ -50,9 +50,10 @@ void print_triangles(const Scene& scene) {
   for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
     const Material& m = scene.materials[scene.triangle_materials[t]];
     perforated += m.alpha_map != kNone && !scene.triangle_uvs.empty();
-    translucent += m.opacity < 1.0f;
+    translucent += m.translucent();
   }
-  fmt::print("triangles    {} ({} alpha-tested, {} with d < 1)\n", scene.triangles.size(), perforated, translucent);
+  fmt::print("triangles    {} ({} with an alpha map, {} translucent)\n", scene.triangles.size(), perforated,
+             translucent);
 }
 
 void print_light(const Light& light) {

@@ -11,6 +11,8 @@
 #include "halfshade/error.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/method_options.h"
+#include "shadows/opaque_mesh.h"
+#include "shadows/raytrace/raytrace.h"
 #include "shadows/solver.h"
 #include "stats_json.h"
 
@@ -66,20 +68,15 @@ void make_mesh(Pipeline& pipeline) {
     reach.insert(reach.end(), extent.begin(), extent.end());
   }
   pipeline.mesh = make_lattice_mesh(pipeline.source.scene, make_local_frame(pipeline.source.scene.positions, reach));
+  pipeline.panes = find_panes(pipeline.mesh);
   pipeline.frame_ms = watch.lap();
 }
 
-void print_warnings(const PipelineOptions& options, const Pipeline& pipeline) {
+void print_warnings(const Pipeline& pipeline) {
   for (const std::string& warning : pipeline.source.report.warnings)
     fmt::print(stderr, "halfshade: warning: {}\n", warning);
   if (pipeline.source.view_was_made_up)
     fmt::print(stderr, "halfshade: no view file: camera and light were fitted to the scene\n");
-  std::uint64_t translucent = 0;
-  for (const std::uint32_t m : pipeline.source.scene.triangle_materials)
-    translucent += pipeline.source.scene.materials[m].opacity < 1.0f;
-  if (translucent > 0) {
-    fmt::print(stderr, "halfshade: {} triangles have d < 1; {} treats them as opaque\n", translucent, options.method);
-  }
 }
 
 std::string method_names() {
@@ -111,6 +108,8 @@ void draw(const PipelineOptions& options, Pipeline& pipeline) {
   }
 }
 
+void read_size(const PipelineOptions& options, Pipeline& pipeline) { parse_size(options, pipeline); }
+
 void usage_error(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
 
 ShadowConfig shadow_config(const PipelineOptions& options) {
@@ -132,8 +131,7 @@ nlohmann::ordered_json method_json(const PipelineOptions& o) {
   const ShadowConfig config = shadow_config(o);
   nlohmann::ordered_json options = nlohmann::ordered_json::object();
   for (const MethodOption& option : method_options()) {
-    const std::string name = option.name;
-    if (name.starts_with(o.method + ".")) options[name] = option.get(config);
+    if (concerns(option, config.method)) options[option.name] = option.get(config);
   }
   return {{"name", o.method},
           {"light_samples", o.light_samples},
@@ -144,18 +142,22 @@ nlohmann::ordered_json method_json(const PipelineOptions& o) {
           {"seed", o.seed},
           {"grid_resolution", o.grid},
           {"options", options},
-          {"exact", traits_of(config.method).exact}};
+          {"exact", promises_exactness(config)}};
 }
 
 void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                            const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
                            std::vector<float>& visibility, ShadowStats& stats) {
-  if (!traits_of(config.method).masks) {
+  if (!yields_masks(config)) {
     masks = {};
     solve_visibility(mesh, receivers, light, samples, config, visibility, stats);
     return;
   }
-  solve_masks(mesh, receivers, light, samples, config, masks, stats);
+  if (config.method == ShadowMethod::kRaytrace) {
+    solve_raytrace(OpaqueMesh(mesh).get(), receivers, samples, config, masks, stats);
+  } else {
+    solve_masks(mesh, receivers, light, samples, config, masks, stats);
+  }
   visibility.resize(receivers.size());
   for (std::size_t i = 0; i < receivers.size(); ++i) visibility[i] = masks.visibility(i);
 }
@@ -174,7 +176,7 @@ void open_pipeline(const PipelineOptions& options, double extra_bytes_per_sample
   Stopwatch watch;
   pipeline.source = load_scene(options.scene, options.view_file, options.load);
   pipeline.load_ms = watch.lap();
-  print_warnings(options, pipeline);
+  print_warnings(pipeline);
   if (pipeline.source.view.lights.empty()) throw Error(ErrorCode::kBadInput, "the view has no light");
   check_memory(options, extra_bytes_per_sample, pipeline);
   make_mesh(pipeline);

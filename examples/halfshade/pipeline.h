@@ -8,6 +8,7 @@
 #include "rasterizer/bent_normals.h"
 #include "rasterizer/rasterizer.h"
 #include "scene_source.h"
+#include "shadows/panes.h"
 #include "shadows/receivers.h"
 #include "verbs.h"
 
@@ -30,6 +31,7 @@ struct Pipeline {
   RasterConfig raster;
   std::uint32_t subsamples = 1;  // per axis and pixel
   LatticeMesh mesh;
+  Panes panes;  // translucent triangles of the mesh
   GBuffer gbuffer;
   RasterStats raster_stats;
   std::optional<BentNormals> bent_normals;  // with --shading bent
@@ -43,6 +45,9 @@ void add_pipeline_options(CLI::App& verb, PipelineOptions& options);
 /// `extra_bytes_per_sample` counts what the verb keeps per sample of the picture and light. Throws Error.
 void open_pipeline(const PipelineOptions& options, double extra_bytes_per_sample, Pipeline& pipeline);
 
+/// --size, --spp and --crop into pipeline.raster. Throws Error{kUsage}.
+void read_size(const PipelineOptions& options, Pipeline& pipeline);
+
 /// Makes the G-buffer for raster.subpixel_offset, and the cosines that belong to it.
 void draw(const PipelineOptions& options, Pipeline& pipeline);
 
@@ -50,7 +55,8 @@ void draw(const PipelineOptions& options, Pipeline& pipeline);
 ShadowConfig shadow_config(const PipelineOptions& options);
 nlohmann::ordered_json method_json(const PipelineOptions& options);
 
-/// One light by the configured method: masks, where it yields them, and visibility per receiver.
+/// One light by the configured method: masks, where it yields them, and visibility per receiver; of the opaque
+/// triangles.
 void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                            const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
                            std::vector<float>& visibility, ShadowStats& stats);

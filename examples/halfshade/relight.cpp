@@ -52,6 +52,14 @@ void run(const RelightOptions& options) {
   Dump dump;
   read_dump(options.dump, dump);
   const DumpLighting lighting = read_lighting(options.dump, dump);
+  const auto counts = dump.about.value("counts", nlohmann::ordered_json::object());
+  const std::uint64_t translucent = counts.value("translucent_triangles", std::uint64_t{0});
+  if (translucent > 0) {
+    fmt::print(stderr,
+               "halfshade: warning: {} translucent triangles: the dump's masks do not know them, their light is "
+               "neither dimmed nor coloured\n",
+               translucent);
+  }
   const EmissionImage image = load_emission_image(options.emission);
   Stopwatch watch;
   const Picture picture = relit_picture(dump, lighting, sample_emission(image, dump.samples));

@@ -13,8 +13,11 @@
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/shading.h"
+#include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
+#include "shadows/transmittance.h"
+#include "render_stream.h"
 #include "stats_json.h"
 
 namespace halfshade {
@@ -25,7 +28,8 @@ using nlohmann::ordered_json;
 struct RenderOptions : PipelineOptions {
   std::string output, json, dump;
   double verify_percent = 0.0;
-  bool stats = false;
+  bool stats = false, stream = false;
+  StreamRenderOptions streamed;  // what only --stream knows
 };
 
 /// Results of one light.
@@ -37,10 +41,13 @@ struct LightResult {
   ShadowStats stats;
   double samples_ms = 0.0, shadow_ms = 0.0;
   std::vector<float> visibility;       // [G-buffer entry]
-  std::vector<vec3> visible_emission;  // [G-buffer entry], for lights with an emission image
+  std::vector<vec3> visible_emission;  // [G-buffer entry], with an emission image or translucent triangles
+  std::vector<vec3> reaching;          // [receiver] through translucent triangles, if there are any
   std::uint64_t lit = 0, umbra = 0, penumbra = 0;
   std::uint64_t verified = 0, verified_bits = 0, wrong_bits = 0;
   double rms_error = 0.0, largest_error = 0.0;  // of visibility, over the verified receivers
+  double mean_error = 0.0;                      // with its sign: positive is too light
+  std::uint64_t wrong_lights = 0;               // verified receivers whose transmitted light has a wrong bit
 };
 
 struct Render : Pipeline {
@@ -71,8 +78,20 @@ void spread_emission(const GBuffer& gbuffer, const EmissionImage& image, LightRe
   }
 }
 
+/// Light through translucent triangles, in place of emission times visibility.
+void spread_transmitted(const Render& render, const Light& light, const ShadowConfig& config, LightResult& result) {
+  if (render.panes.empty()) return;
+  solve_reaching_light(render.panes, result.receivers, light, result.samples, config, result.masks,
+                       result.receiver_visibility, result.reaching, result.stats);
+  const vec3 emission = light.emission_image.empty() ? light.emission : vec3(1.0f);
+  result.visible_emission.assign(render.gbuffer.size(), vec3(0.0f));
+  for (std::size_t i = 0; i < result.receivers.size(); ++i) {
+    result.visible_emission[result.receivers.sample[i]] = emission * result.reaching[i];
+  }
+}
+
 /// Re-runs a share of the receivers, chosen by hash, through the oracle: wrong bits, and errors of visibility.
-void verify(const Render& render, LightResult& result) {
+void verify(const Render& render, const Light& light, LightResult& result) {
   const auto share = static_cast<std::uint32_t>(std::min(render.options.verify_percent, 100.0) * 0.01 * 4294967295.0);
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < result.receivers.size(); ++i) {
@@ -80,11 +99,20 @@ void verify(const Render& render, LightResult& result) {
   }
   std::vector<std::uint64_t> wrong(chosen.size(), 0);
   std::vector<double> error(chosen.size(), 0.0);
+  std::vector<std::uint8_t> wrong_light(chosen.size(), 0);
+  std::vector<vec3> weights;
+  if (!light.emission_image.empty()) weights = sample_emission(light.emission_image, result.samples);
+  const OpaqueMesh opaque(render.mesh);
   parallel_ranges(chosen.size(), 4, [&](std::size_t begin, std::size_t end) {
     VisibilityMasks truth;
     for (std::size_t k = begin; k != end; ++k) {
       truth.reset(1, result.samples.count);
-      oracle_mask(render.mesh, result.receivers, chosen[k], result.samples, truth.words);
+      oracle_mask(opaque.get(), result.receivers, chosen[k], result.samples, truth.words);
+      if (!result.reaching.empty()) {
+        wrong_light[k] =
+            result.reaching[chosen[k]] !=
+            reference_transmittance(render.panes, result.receivers, chosen[k], result.samples, truth.words, weights);
+      }
       error[k] = double{result.receiver_visibility[chosen[k]]} - truth.visibility(0);
       if (result.masks.words.empty()) continue;
       const auto mask = result.masks.mask(chosen[k]);
@@ -95,8 +123,10 @@ void verify(const Render& render, LightResult& result) {
   result.verified = chosen.size();
   result.verified_bits = chosen.size() * result.masks.sample_count;
   for (const std::uint64_t w : wrong) result.wrong_bits += w;
+  for (const std::uint8_t w : wrong_light) result.wrong_lights += w;
   for (const double e : error) {
     result.rms_error += e * e / static_cast<double>(chosen.size());
+    result.mean_error += e / static_cast<double>(chosen.size());
     result.largest_error = std::max(result.largest_error, std::fabs(e));
   }
   result.rms_error = std::sqrt(result.rms_error);
@@ -115,11 +145,12 @@ void solve_light(Render& render, const Light& light) {
     config.progress = [&progress](double done) { return progress(done); };
     solve_light_by_method(render.mesh, result.receivers, light, result.samples, config, result.masks,
                           result.receiver_visibility, result.stats);
+    spread_transmitted(render, light, config, result);
   }
   result.shadow_ms = watch.lap();
   spread_visibility(render.gbuffer, result);
-  spread_emission(render.gbuffer, light.emission_image, result);
-  if (options.verify_percent > 0.0) verify(render, result);
+  if (render.panes.empty()) spread_emission(render.gbuffer, light.emission_image, result);
+  if (options.verify_percent > 0.0) verify(render, light, result);
 }
 
 ImageAttributes attributes(const Render& render) {
@@ -173,13 +204,17 @@ ordered_json light_json(const Render& render, std::size_t index) {
                        {"receivers_penumbra", light.penumbra},
                        {"receivers_umbra", light.umbra},
                        {"mask_bytes", light.masks.words.size() * 8}};
+  const std::string assumptions = method_assumptions(shadow_config(render.options), render.source.view.lights[index]);
+  if (!assumptions.empty()) json["assumes"] = assumptions;
   if (!light.masks.words.empty()) json["mask_hash"] = light.masks.hash();
   if (light.verified > 0)
     json["verify"] = {{"receivers", light.verified},
                       {"bits", light.verified_bits},
                       {"wrong_bits", light.wrong_bits},
                       {"visibility_rms_error", light.rms_error},
-                      {"visibility_largest_error", light.largest_error}};
+                      {"visibility_mean_error", light.mean_error},
+                      {"visibility_largest_error", light.largest_error},
+                      {"wrong_transmitted_lights", light.wrong_lights}};
   return json;
 }
 
@@ -272,6 +307,10 @@ void print_summary(const Render& render) {
   fmt::print(out, "picture    {}x{}, {} spp; load {:.0f} ms, rasterize {:.1f} ms\n",
              render.raster.width / render.subsamples, render.raster.height / render.subsamples, render.options.spp,
              render.load_ms, render.rasterize_ms);
+  if (!render.panes.empty()) {
+    fmt::print(out, "light      through {} translucent triangles; visibility is that of the others\n",
+               render.panes.translucent);
+  }
   for (std::size_t i = 0; i < render.lights.size(); ++i) {
     const LightResult& l = render.lights[i];
     const ShadowStats& s = l.stats;
@@ -279,15 +318,22 @@ void print_summary(const Render& render) {
                render.source.view.lights[i].name, l.samples.count, l.receivers.size(), l.lit, l.penumbra, l.umbra);
     fmt::print(out, "shadows    {} {:.1f} ms (index {:.1f}, cull {:.1f}, test {:.1f})\n", render.options.method,
                l.shadow_ms - s.build_ms, s.index_ms, s.cull_ms, s.test_ms);
-    if (traits_of(shadow_method_from_name(render.options.method)).exact) {
+    if (promises_exactness(shadow_config(render.options))) {
       fmt::print(out, "exactness  {} of {} sample tests went to the exact predicate\n", s.exact_fallbacks,
                  s.sample_tests);
     } else {
       fmt::print(out, "exactness  {} is approximate: --verify says how wrong it is here\n", render.options.method);
+      fmt::print(out, "assumes    {}\n",
+                 method_assumptions(shadow_config(render.options), render.source.view.lights[i]));
     }
     if (l.verified > 0) {
-      fmt::print(out, "verify     {} receivers, {} bits, {} wrong; visibility off by {:.5f} (rms), {:.5f} (largest)\n",
-                 l.verified, l.verified_bits, l.wrong_bits, l.rms_error, l.largest_error);
+      fmt::print(out,
+                 "verify     {} receivers, {} bits, {} wrong; visibility off by {:.5f} (rms), {:.5f} (largest), "
+                 "{:+.5f} (mean; + is too light)\n",
+                 l.verified, l.verified_bits, l.wrong_bits, l.rms_error, l.largest_error, l.mean_error);
+      if (!l.reaching.empty()) {
+        fmt::print(out, "           light through translucent triangles wrong at {} receivers\n", l.wrong_lights);
+      }
     }
     if (!l.masks.words.empty()) fmt::print(out, "mask hash  {}\n", l.masks.hash());
     if (render.options.stats) print_stats(out, s);
@@ -302,9 +348,15 @@ int run(RenderOptions options) {
   if (!o.output.empty()) check_picture_path(o.output);
   if (!(o.verify_percent >= 0.0 && o.verify_percent <= 100.0))
     usage_error(fmt::format("--verify {} is not in 0..100", o.verify_percent));
-  if (!o.dump.empty() && !traits_of(shadow_method_from_name(o.method)).masks)
+  if (!o.dump.empty() && !yields_masks(shadow_config(o)))
     usage_error(fmt::format("--dump: method '{}' yields no masks", o.method));
   open_pipeline(o, 0.0, render);
+  if (!render.panes.empty() && !yields_masks(shadow_config(o))) {
+    fmt::print(stderr,
+               "halfshade: warning: {} translucent triangles: {} does not know which light samples it sees; its "
+               "visibility times the transmittance of the whole light is approximate\n",
+               render.panes.translucent, o.method);
+  }
   for (const Light& light : render.source.view.lights) solve_light(render, light);
   if (!o.output.empty()) write_picture_file(render);
   if (!o.dump.empty()) write_dumps(render);
@@ -313,10 +365,21 @@ int run(RenderOptions options) {
     const std::string text = run_json(render).dump(2) + "\n";
     o.json == "-" ? void(std::fputs(text.c_str(), stdout)) : write_file_atomically(o.json, text);
   }
-  const bool must_be_exact = traits_of(shadow_method_from_name(o.method)).exact;
+  const bool must_be_exact = promises_exactness(shadow_config(o));
   for (const LightResult& light : render.lights) {
-    if (must_be_exact && light.wrong_bits > 0) return kDifferent;
+    if (must_be_exact && light.wrong_bits + light.wrong_lights > 0) return kDifferent;
   }
+  return kOk;
+}
+
+/// The default method means hpc here.
+int run_streamed(const RenderOptions& o) {
+  if (o.verify_percent > 0.0 || !o.dump.empty()) usage_error("--stream: --verify and --dump need the whole scene");
+  StreamRenderOptions streamed = o.streamed;
+  static_cast<PipelineOptions&>(streamed) = o;
+  streamed.output = o.output, streamed.json = o.json, streamed.stats = o.stats;
+  if (o.method == PipelineOptions().method) streamed.method = "hpc";
+  render_stream(streamed);
   return kOk;
 }
 
@@ -332,9 +395,14 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code) 
   verb->add_option("--verify", o->verify_percent, "Check this percentage of the receivers with the oracle")
       ->capture_default_str();
   verb->add_flag("--stats", o->stats, "Print every counter of the method");
+  verb->add_flag("--stream", o->stream, "Never hold the whole scene: method hpc, blockers sorted into files on disk");
+  verb->add_option("--stream-dir", o->streamed.directory, "Directory of these files (default: the system's)");
+  verb->add_option("--max-memory", o->streamed.max_mib, "--stream: MiB to stay within; receivers are split into parts");
+  verb->add_option("--piece", o->streamed.piece, "--stream: triangles of a built-in scene made at once")
+      ->capture_default_str();
   verb->callback([o, &exit_code, command_line] {
     o->command_line = command_line;
-    run_in_arena(o->threads, [&] { exit_code = run(*o); });
+    run_in_arena(o->threads, [&] { exit_code = o->stream ? run_streamed(*o) : run(*o); });
   });
 }
 

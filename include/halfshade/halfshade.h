@@ -8,13 +8,16 @@
 // Determinism  equal inputs and configuration give equal bits for any number of threads and any instruction set.
 // Exactness    a light sample is blocked where, in exact arithmetic on the rounded points, receiver and sample lie
 //              strictly on opposite sides of a triangle's plane and the segment between them meets the closed triangle,
-//              which is not the receiver's own, at an opaque texel.
+//              which is neither translucent nor the receiver's own, at an opaque texel.
 #pragma once
 
 #include "halfshade/accumulation.h"
+#include "halfshade/depth_complexity.h"
 #include "halfshade/emission.h"
 #include "halfshade/error.h"
 #include "halfshade/light.h"
 #include "halfshade/scene.h"
 #include "halfshade/shadows.h"
+#include "halfshade/stream.h"
+#include "halfshade/transmittance.h"
 #include "halfshade/types.h"

@@ -22,14 +22,23 @@ struct AlphaMap {
 };
 
 /// Lambert surface. A texel is opaque where alpha / 255 >= alpha_cutoff.
+///
+/// Translucent surfaces do not block light samples: each crossing multiplies the light by a transmittance per channel,
+/// (1 - opacity) * transmittance * transmittance_map; the alpha map of such a surface is no test but says how much of
+/// it there is: 1 - a + a * transmittance (halfshade/transmittance.h).
 struct Material {
   std::string name;
   vec3 diffuse{0.8f};               // Kd, linear RGB
-  float opacity = 1.0f;             // d
-  vec3 transmittance{0.0f};         // Tf
+  float opacity = 1.0f;             // d: share of the light that the surface stops; 1 = all
+  vec3 transmittance{1.0f};         // Tf, linear RGB: what the surface leaves of the rest; above 1 counts as 1
   std::uint32_t color_map = kNone;  // index into Scene::color_maps (map_Kd)
   std::uint32_t alpha_map = kNone;  // index into Scene::alpha_maps (map_d)
   float alpha_cutoff = 0.5f;
+  std::uint32_t transmittance_map = kNone;  // index into Scene::color_maps (map_Tf); nearest texel
+
+  bool translucent() const {
+    return opacity < 1.0f && (transmittance.x > 0.0f || transmittance.y > 0.0f || transmittance.z > 0.0f);
+  }
 };
 
 /// Indexed triangles. Positions are finite; indices are in range (the loaders check, Scene does not).

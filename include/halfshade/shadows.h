@@ -45,6 +45,7 @@ struct ShadowConfig {
   GearsOptions gears = {};
   ShadowVolumeOptions stsv = {};
   ShadowMapOptions shadow_map = {};
+  RaytraceOptions raytrace = {};
 };
 
 /// Blocked masks of all receivers: bit i of a receiver's words is set where light sample i is hidden.

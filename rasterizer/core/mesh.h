@@ -23,9 +23,20 @@ struct LatticeMesh {
     if (scene == nullptr || scene->triangle_uvs.empty()) return kNone;
     return scene->materials[scene->triangle_materials[triangle]].alpha_map;
   }
+  /// Does light pass through it? Then it blocks no sample (halfshade/transmittance.h).
+  bool translucent(std::uint32_t triangle) const {
+    if (scene == nullptr || scene->triangle_materials.empty()) return false;
+    return scene->materials[scene->triangle_materials[triangle]].translucent();
+  }
 };
 
 /// Moves the scene into `frame` and snaps it. Parallel; equal bits for any number of threads.
 LatticeMesh make_lattice_mesh(const Scene& scene, const LocalFrame& frame);
+
+std::size_t count_translucent(const LatticeMesh& mesh);
+
+/// A copy in which every translucent triangle is shrunk to one of its corners. Triangles without area block nothing and
+/// cover no pixel, whoever looks at them, and all triangles keep their numbers: what the masks are made of.
+LatticeMesh opaque_part(const LatticeMesh& mesh);
 
 }  // namespace halfshade

@@ -81,6 +81,25 @@ std::string read_regular_file(const fs::path& file, std::uint64_t max_bytes) {
   return bytes;
 }
 
+RegularFile::RegularFile(const fs::path& file) : file_(file) {
+  struct stat status {};
+  descriptor_ = open_regular(file, status);
+  if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) return;
+  ::close(descriptor_);
+  require_regular(file, status);
+  fail_errno(file, "read");
+}
+
+RegularFile::~RegularFile() { ::close(descriptor_); }
+
+std::size_t RegularFile::read(char* bytes, std::size_t most) {
+  for (;;) {
+    const ssize_t got = ::read(descriptor_, bytes, most);
+    if (got >= 0) return static_cast<std::size_t>(got);
+    if (errno != EINTR) fail_errno(file_, "read");
+  }
+}
+
 AssetRoot::AssetRoot(const fs::path& directory, bool allow_any) : allow_any_(allow_any) {
   std::error_code failure;
   root_ = fs::canonical(directory.empty() ? fs::path(".") : directory, failure);

@@ -13,6 +13,21 @@ namespace halfshade {
 /// Throws Error{kBadInput} (missing, not regular, unreadable) or Error{kLimit} (more than `max_bytes`).
 std::string read_regular_file(const std::filesystem::path& file, std::uint64_t max_bytes);
 
+/// A regular file that is read from front to end; refuses what read_regular_file refuses.
+class RegularFile {
+ public:
+  explicit RegularFile(const std::filesystem::path& file);
+  ~RegularFile();
+  RegularFile(const RegularFile&) = delete;
+  RegularFile& operator=(const RegularFile&) = delete;
+  /// Up to `most` bytes; 0 at the end.
+  std::size_t read(char* bytes, std::size_t most);
+
+ private:
+  std::filesystem::path file_;
+  int descriptor_ = -1;
+};
+
 /// Where the files that an OBJ or MTL names may lie.
 class AssetRoot {
  public:

@@ -39,13 +39,14 @@ class MtlParser {
     if (keyword == "newmtl") return start(tokens.rest());
     const bool is_color = keyword == "Kd" || keyword == "Tf" || keyword == "Kt";
     const bool is_opacity = keyword == "d" || keyword == "Tr";
-    const bool is_map = keyword == "map_Kd" || keyword == "map_d";
+    const bool is_map = keyword == "map_Kd" || keyword == "map_d" || keyword == "map_Tf";
     if (!is_color && !is_opacity && !is_map) return;
     if (!open_) throw lines_.error(in_quotes(keyword) + " before the first newmtl");
     if (is_color) return copy_numbers(keyword, tokens, 3, 1e6);
     if (is_opacity) return copy_numbers(keyword, tokens, 1, 1.0);
-    (keyword == "map_Kd" ? color_line_ : alpha_line_) = lines_.number();
-    block_ += fmt::format("{} {}\n", keyword, tokens.rest());
+    (keyword == "map_Kd" ? color_line_ : keyword == "map_d" ? alpha_line_ : filter_line_) = lines_.number();
+    // tinyobjloader does not know map_Tf; the place of map_Ks, which means nothing here, is free for it.
+    block_ += fmt::format("{} {}\n", keyword == "map_Tf" ? "map_Ks" : keyword, tokens.rest());
   }
 
   void start(std::string_view name) {
@@ -53,7 +54,7 @@ class MtlParser {
     if (name.empty()) throw lines_.error("newmtl without a name");
     open_ = true;
     name_ = name;
-    has_diffuse_ = false;
+    has_diffuse_ = has_filter_ = has_opacity_ = false;
     block_ = "newmtl material\n";
   }
 
@@ -72,7 +73,7 @@ class MtlParser {
       throw lines_.error(
           fmt::format("{} with {} numbers, allowed 1{}", keyword, numbers.size(), count == 3 ? " or 3" : ""));
     }
-    if (keyword == "Kd") has_diffuse_ = true;
+    (keyword == "Kd" ? has_diffuse_ : count == 3 ? has_filter_ : has_opacity_) = true;
     block_ += keyword;
     for (std::size_t k = 0; k < count; ++k) block_ += fmt::format(" {}", numbers[numbers.size() == 1 ? 0 : k]);
     block_ += '\n';
@@ -97,11 +98,14 @@ class MtlParser {
     result.material.name = name_;
     if (has_diffuse_) result.material.diffuse = rgb(read.diffuse);
     result.material.opacity = static_cast<float>(read.dissolve);
-    result.material.transmittance = rgb(read.transmittance);
+    if (has_filter_) result.material.transmittance = rgb(read.transmittance);
     result.color_file = {read.diffuse_texname, color_line_};
     result.alpha_file = {read.alpha_texname, alpha_line_};
+    result.filter_file = {read.specular_texname, filter_line_};
+    if (!result.filter_file.name.empty() && !has_opacity_) result.material.opacity = 0.0f;
     warn_options("map_Kd", read.diffuse_texopt);
     warn_options("map_d", read.alpha_texopt);
+    warn_options("map_Tf", read.specular_texopt);
     return result;
   }
 
@@ -119,8 +123,8 @@ class MtlParser {
   std::vector<std::string>& warnings_;
   std::vector<MtlMaterial> materials_;
   std::string name_, block_;  // the material being read, and its checked lines
-  std::uint64_t color_line_ = 0, alpha_line_ = 0;
-  bool open_ = false, has_diffuse_ = false;
+  std::uint64_t color_line_ = 0, alpha_line_ = 0, filter_line_ = 0;
+  bool open_ = false, has_diffuse_ = false, has_filter_ = false, has_opacity_ = false;
 };
 
 }  // namespace

@@ -22,9 +22,13 @@ constexpr double kLargestUv = 0x1p30;        // with a grid of 2^-32, texel arit
 // Positions by value: open addressing, as a map of nodes would cost more than all the parsing.
 class PositionTable {
  public:
-  explicit PositionTable(std::vector<dvec3>& positions) : positions_(positions), slots_(1024, kNone) {}
+  PositionTable(std::vector<dvec3>& positions, bool weld) : positions_(positions), weld_(weld), slots_(1024, kNone) {}
 
   std::uint32_t insert(const dvec3& p) {
+    if (!weld_) {
+      positions_.push_back(p);
+      return static_cast<std::uint32_t>(positions_.size() - 1);
+    }
     if (positions_.size() * 2 > slots_.size()) grow();
     std::uint32_t& slot = slots_[find(p)];
     if (slot == kNone) {
@@ -57,6 +61,7 @@ class PositionTable {
   }
 
   std::vector<dvec3>& positions_;
+  bool weld_;
   std::vector<std::uint32_t> slots_;  // power of two
 };
 
@@ -75,17 +80,38 @@ vec3 unit_or_zero(dvec3 n) {
 
 class ObjParser {
  public:
-  ObjParser(std::string_view text, const std::string& name, bool lenient)
-      : lines_(text, name), lenient_(lenient), table_(out_.positions) {}
+  ObjParser(std::string_view text, const std::string& name, bool lenient, bool weld = true)
+      : name_(name), lines_(text, name), lenient_(lenient), table_(out_.positions, weld) {}
 
   ObjGeometry run() {
-    std::string_view line;
-    while (lines_.next(line)) parse_line(line);
+    parse_lines();
     finish();
     return std::move(out_);
   }
 
+  void parse_piece(std::string_view text) {
+    lines_ = TextLines(text, name_, lines_.lines_read());
+    parse_lines();
+  }
+
+  void finish() {
+    out_.vertices = position_of_.size();
+    const auto more = [&](std::uint64_t count, const char* what) {
+      if (count > kMostWarnings)
+        out_.warnings.push_back(fmt::format("{} more lines with {}", count - kMostWarnings, what));
+    };
+    more(tolerated_, "errors");
+    more(unknown_, "unknown keywords");
+  }
+
+  ObjGeometry& geometry() { return out_; }
+
  private:
+  void parse_lines() {
+    std::string_view line;
+    while (lines_.next(line)) parse_line(line);
+  }
+
   struct Corner {
     std::uint32_t position, uv, normal;
   };
@@ -286,16 +312,7 @@ class ObjParser {
     if (++count <= kMostWarnings) out_.warnings.emplace_back(text);
   }
 
-  void finish() {
-    out_.vertices = position_of_.size();
-    const auto more = [&](std::uint64_t count, const char* what) {
-      if (count > kMostWarnings)
-        out_.warnings.push_back(fmt::format("{} more lines with {}", count - kMostWarnings, what));
-    };
-    more(tolerated_, "errors");
-    more(unknown_, "unknown keywords");
-  }
-
+  const std::string name_;
   TextLines lines_;
   bool lenient_;
   ObjGeometry out_;
@@ -317,6 +334,23 @@ class ObjParser {
 
 ObjGeometry parse_obj(std::string_view text, const std::string& name, bool lenient) {
   return ObjParser(text, name, lenient).run();
+}
+
+struct ObjPieceParser::State {
+  State(const std::string& name, bool lenient) : parser({}, name, lenient, false) {}
+  ObjParser parser;
+};
+
+ObjPieceParser::ObjPieceParser(const std::string& name, bool lenient)
+    : state_(std::make_unique<State>(name, lenient)) {}
+ObjPieceParser::~ObjPieceParser() = default;
+void ObjPieceParser::parse(std::string_view lines) { state_->parser.parse_piece(lines); }
+void ObjPieceParser::finish() { state_->parser.finish(); }
+ObjGeometry& ObjPieceParser::geometry() { return state_->parser.geometry(); }
+
+void ObjPieceParser::drop_triangles() {
+  ObjGeometry& g = geometry();
+  g.triangles.clear(), g.triangle_materials.clear(), g.triangle_uvs.clear(), g.triangle_normals.clear();
 }
 
 }  // namespace halfshade

@@ -5,6 +5,7 @@
 // out of range, and counts a face's corners in 8 bits (version 2.0.0rc10).
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -29,5 +30,24 @@ struct ObjGeometry {
 /// `name` is the file in messages. With `lenient`, faces that are wrong or use a wrong v, vt or vn are skipped and
 /// counted. Throws Error{kBadInput} with "name:line: what, value, allowed range".
 ObjGeometry parse_obj(std::string_view text, const std::string& name, bool lenient);
+
+/// The same for a text that comes in pieces of whole lines. What v, vt and vn lines hold stays in memory, as any face
+/// may use it; triangles stay until they are dropped. Equal positions are not welded.
+class ObjPieceParser {
+ public:
+  ObjPieceParser(const std::string& name, bool lenient);
+  ~ObjPieceParser();
+  /// Throws as parse_obj.
+  void parse(std::string_view lines);
+  /// After the last piece: totals and warnings.
+  void finish();
+  /// All positions so far; triangles since the last drop.
+  ObjGeometry& geometry();
+  void drop_triangles();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace halfshade

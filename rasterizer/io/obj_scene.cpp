@@ -39,7 +39,7 @@ class ObjLoader {
 
  private:
   struct MaterialMaps {
-    std::uint32_t color = kNone, alpha = kNone;  // requests to textures_
+    std::uint32_t color = kNone, alpha = kNone, filter = kNone;  // requests to textures_
   };
 
   // What `reference`, on a line of `named_by`, stands for; kind is the keyword, for messages.
@@ -90,7 +90,8 @@ class ObjLoader {
     }
     scene_.materials.push_back(std::move(entry.material));
     const std::uint32_t color = request_texture(library, entry.color_file, TextureKind::kColor, "map_Kd");
-    maps_.push_back({color, request_texture(library, entry.alpha_file, TextureKind::kAlpha, "map_d")});
+    const std::uint32_t alpha = request_texture(library, entry.alpha_file, TextureKind::kAlpha, "map_d");
+    maps_.push_back({color, alpha, request_texture(library, entry.filter_file, TextureKind::kColor, "map_Tf")});
   }
 
   std::uint32_t request_texture(const fs::path& library, const FileReference& reference, TextureKind kind,
@@ -126,6 +127,7 @@ class ObjLoader {
     for (std::size_t i = 0; i < scene_.materials.size(); ++i) {
       if (maps_[i].color != kNone) scene_.materials[i].color_map = textures_.color_map(maps_[i].color);
       if (maps_[i].alpha != kNone) scene_.materials[i].alpha_map = textures_.alpha_map(maps_[i].alpha);
+      if (maps_[i].filter != kNone) scene_.materials[i].transmittance_map = textures_.color_map(maps_[i].filter);
     }
   }
 
@@ -186,6 +188,13 @@ Scene load_obj(const fs::path& file, const ObjLoadOptions& options, ObjLoadRepor
                             geometry.vertices, geometry.faces, geometry.skipped_faces));
   }
   return ObjLoader(file, options, report).run(std::move(geometry));
+}
+
+Scene load_obj_materials(const fs::path& file, const ObjLoadOptions& options, ObjGeometry used,
+                         ObjLoadReport& report) {
+  const FpEnvironment environment;
+  fill_report(used, report);
+  return ObjLoader(file, options, report).run(std::move(used));
 }
 
 }  // namespace halfshade

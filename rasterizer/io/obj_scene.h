@@ -27,8 +27,15 @@ struct ObjLoadReport {
 
 /// Faces are cut into triangles, bit-equal positions welded, groups ignored. Triangle order is the file's.
 /// Fallbacks for what is missing: no library or unknown material -> the last material, "default"; no map_Kd file -> Kd;
-/// no map_d file -> opaque. map_d takes the alpha channel if the picture has one, else its luminance.
-/// Throws Error{kBadInput} (message with file, line, value and allowed range) or Error{kLimit}.
+/// no map_d file -> opaque; no map_Tf file -> Tf. map_d takes the alpha channel if the picture has one, else its
+/// luminance. Throws Error{kBadInput} (message with file, line, value and allowed range) or Error{kLimit}.
 Scene load_obj(const std::filesystem::path& file, const ObjLoadOptions& options, ObjLoadReport& report);
+
+struct ObjGeometry;
+
+/// Materials and textures alone: those that `used` names (material_names, libraries; triangle_materials has each
+/// material that some triangle uses). Scene::triangle_materials of the result says what became of these.
+Scene load_obj_materials(const std::filesystem::path& file, const ObjLoadOptions& options, ObjGeometry used,
+                         ObjLoadReport& report);
 
 }  // namespace halfshade

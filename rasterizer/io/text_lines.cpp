@@ -18,11 +18,12 @@ bool is_comment(std::string_view line) {
 
 }  // namespace
 
-TextLines::TextLines(std::string_view text, std::string name) : rest_(text), name_(std::move(name)) {
+TextLines::TextLines(std::string_view text, std::string name, std::uint64_t lines_before)
+    : rest_(text), name_(std::move(name)), number_(lines_before), ended_(lines_before) {
   if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
   const std::size_t zero = text.find('\0');
   if (zero == std::string_view::npos) return;
-  number_ =
+  number_ +=
       1 + static_cast<std::uint64_t>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(zero), '\n'));
   throw error(fmt::format("zero byte at offset {}: not a text file", zero));
 }

@@ -16,13 +16,16 @@ class TextLines {
   static constexpr std::size_t kLongestLine = std::size_t{1} << 20;  // bytes
 
   /// `text` must outlive this. `name` is the file in messages. Throws Error{kBadInput} when it holds a zero byte.
-  TextLines(std::string_view text, std::string name);
+  /// `lines_before` counts the file's lines in front of the text.
+  TextLines(std::string_view text, std::string name, std::uint64_t lines_before = 0);
 
   /// Next logical line; valid until the following call. False at the end.
   bool next(std::string_view& line);
 
   /// Where the current line began, counted from 1.
   std::uint64_t number() const { return number_; }
+  /// Lines read so far, those before the text included.
+  std::uint64_t lines_read() const { return ended_; }
 
   /// "file:line: what".
   Error error(const std::string& what) const;

@@ -52,6 +52,11 @@ constexpr std::array kRecipes{
            1000,
            make_room},
     Recipe{{"field", "a matrix of small closed animals", "animals per side, 1..256 (24)"}, 24, 1, 256, make_field},
+    Recipe{{"glass", "stained glass, coloured panes and a veil over a floor", "texels per side, 8..2048 (256)"},
+           256,
+           8,
+           2048,
+           make_glass},
     Recipe{{"sphere", "a ball above a floor", "sides, 4..4096 (64)"}, 64, 4, 4096, make_sphere},
 };
 
@@ -74,7 +79,7 @@ const Recipe& find_recipe(std::string_view name) {
 
 std::span<const BuiltinInfo> builtin_scenes() { return kInfos; }
 
-BuiltinScene make_builtin_scene(std::string_view name, std::uint32_t size) {
+std::uint32_t checked_builtin_size(std::string_view name, std::uint32_t size) {
   const Recipe& recipe = find_recipe(name);
   if (size == 0) size = recipe.default_size;
   if (size < recipe.min_size || size > recipe.max_size) {
@@ -82,6 +87,12 @@ BuiltinScene make_builtin_scene(std::string_view name, std::uint32_t size) {
                                        " is outside " + std::to_string(recipe.min_size) + ".." +
                                        std::to_string(recipe.max_size));
   }
+  return size;
+}
+
+BuiltinScene make_builtin_scene(std::string_view name, std::uint32_t size) {
+  const Recipe& recipe = find_recipe(name);
+  size = checked_builtin_size(name, size);
   const FpEnvironment environment;
   BuiltinScene result;
   result.scene.name = name;

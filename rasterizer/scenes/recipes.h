@@ -17,6 +17,16 @@ void make_sphere(std::uint32_t size, BuiltinScene& out);
 void make_field(std::uint32_t size, BuiltinScene& out);
 void make_grass(std::uint32_t size, BuiltinScene& out);  // strands.cpp
 void make_hairball(std::uint32_t size, BuiltinScene& out);
+void make_glass(std::uint32_t size, BuiltinScene& out);  // glass.cpp
+
+/// `grass` in pieces: everything but the blades, then blades [first, first + count) of `size`, appended to `scene`, five
+/// triangles each.
+inline constexpr std::uint32_t kBladeTriangles = 5;
+void make_lawn(BuiltinScene& out);
+void add_blades(std::uint32_t first, std::uint32_t count, std::uint32_t size, Scene& scene);
+
+/// `size`, or the scene's default for 0. Throws Error{kUsage} as make_builtin_scene.
+std::uint32_t checked_builtin_size(std::string_view name, std::uint32_t size);
 
 /// One-sided rectangle that faces `target`.
 Light rectangle_light(const dvec3& center, const dvec3& target, double width, double height);

@@ -24,7 +24,8 @@ StrandArrays grow(Scene& scene, std::size_t count, std::size_t vertices, std::si
 
 // --- grass -----------------------------------------------------------------------------------------------------------
 
-constexpr std::uint32_t kBladeVertices = 7, kBladeTriangles = 5;
+constexpr std::uint32_t kBladeVertices = 7;
+constexpr std::uint32_t kFirstGreen = 1;  // material
 constexpr double kLawnSide = 8.0;
 
 /// Three pairs of vertices and a tip along a parabola that bends more and more over.
@@ -93,37 +94,45 @@ void join_hair(std::uint32_t first, std::array<std::uint32_t, 3>* triangles) {
 
 }  // namespace
 
-void make_grass(std::uint32_t size, BuiltinScene& out) {
+void make_lawn(BuiltinScene& out) {
   Scene& scene = out.scene;
   MeshBuilder builder(scene);
   builder.material("earth", {0.30f, 0.22f, 0.14f});
   builder.ground(0.5 * kLawnSide + 1.0);
-  const std::uint32_t first_green = builder.material("grass", {0.22f, 0.40f, 0.10f});
+  builder.material("grass", {0.22f, 0.40f, 0.10f});
   builder.material("young grass", {0.34f, 0.50f, 0.14f});
   builder.material("dry grass", {0.50f, 0.46f, 0.20f});
   builder.material("stone", {0.60f, 0.58f, 0.56f});
   builder.ellipsoid({-0.6, 0.45, 0.4}, {0.95, 0.65, 0.8}, 32, 16);
   builder.ellipsoid({1.3, 0.25, 1.3}, {0.5, 0.42, 0.45}, 24, 12);
+  out.view.camera = look({1.0, 3.4, 5.6}, {0.1, 0.2, 0.3}, 45.0);
+  out.view.lights = {rectangle_light({-3.5, 4.5, -1.5}, {0.0, 0.3, 0.3}, 1.75, 1.75)};
+}
 
+void add_blades(std::uint32_t first, std::uint32_t count, std::uint32_t size, Scene& scene) {
   const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(static_cast<double>(size))));
-  const StrandArrays start = grow(scene, size, kBladeVertices, kBladeTriangles);
-  parallel_ranges(size, 4096, [&](std::size_t begin, std::size_t end) {
+  const StrandArrays start = grow(scene, count, kBladeVertices, kBladeTriangles);
+  parallel_ranges(count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
+      const std::uint32_t blade = first + static_cast<std::uint32_t>(i);
       const auto v = static_cast<std::uint32_t>(start.first_vertex + i * kBladeVertices);
-      make_blade(static_cast<std::uint32_t>(i), columns, &scene.positions[v]);
+      make_blade(blade, columns, &scene.positions[v]);
       const std::size_t t = start.first_triangle + i * kBladeTriangles;
       scene.triangles[t] = {v, v + 1, v + 3};
       scene.triangles[t + 1] = {v, v + 3, v + 2};
       scene.triangles[t + 2] = {v + 2, v + 3, v + 5};
       scene.triangles[t + 3] = {v + 2, v + 5, v + 4};
       scene.triangles[t + 4] = {v + 4, v + 5, v + 6};
-      const std::uint32_t shade = Random(0xc0104u, static_cast<std::uint32_t>(i)).bits() % 16;
-      const std::uint32_t material = first_green + (shade < 10 ? 0u : shade < 15 ? 1u : 2u);
+      const std::uint32_t shade = Random(0xc0104u, blade).bits() % 16;
+      const std::uint32_t material = kFirstGreen + (shade < 10 ? 0u : shade < 15 ? 1u : 2u);
       std::fill_n(scene.triangle_materials.begin() + static_cast<std::ptrdiff_t>(t), kBladeTriangles, material);
     }
   });
-  out.view.camera = look({1.0, 3.4, 5.6}, {0.1, 0.2, 0.3}, 45.0);
-  out.view.lights = {rectangle_light({-3.5, 4.5, -1.5}, {0.0, 0.3, 0.3}, 1.75, 1.75)};
+}
+
+void make_grass(std::uint32_t size, BuiltinScene& out) {
+  make_lawn(out);
+  add_blades(0, size, size, out.scene);
 }
 
 void make_hairball(std::uint32_t size, BuiltinScene& out) {

@@ -245,6 +245,41 @@ class Comparing(CommandLine):
         self.expect_failure(BAD_INPUT, "compare", self.dump("dump"), self.dump("other", samples=16))
 
 
+class ApproximateMethods(CommandLine):
+    def render(self, method, *arguments):
+        result = run("render", "builtin:sphere:12", "--size", "40x30", "--light-samples", 16, "--quiet", "--method", method,
+                     "--verify", 20, "--json", self.directory / "stats.json", *arguments)
+        return result, json.loads((self.directory / "stats.json").read_text()) if result.returncode == OK else None
+
+    def test_they_say_what_they_assume_and_how_wrong_they_are(self):
+        for method in ("shadow-map", "pcf", "pcss", "shadow-accumulation", "shadow-maps"):
+            with self.subTest(method=method):
+                result, stats = self.render(method, "--set", "map.resolution=256")
+                self.assertEqual(result.returncode, OK, result.stderr)
+                assumes = re.search(r"^assumes +(\S.*)$", result.stdout, re.MULTILINE).group(1)
+                light = stats["lights"][0]
+                self.assertEqual(light["assumes"], assumes)
+                self.assertEqual(stats["method"]["options"]["map.resolution"], "256")
+                self.assertRegex(result.stdout, r"[+-]0\.\d+ \(mean")
+                self.assertLessEqual(abs(light["verify"]["visibility_mean_error"]),
+                                     light["verify"]["visibility_rms_error"])
+                self.assertGreater(light["verify"]["visibility_rms_error"], 0.0)
+
+    def test_rays_are_traced_or_refused(self):
+        result, stats = self.render("raytrace", "--set", "raytrace.mode=fast")
+        if result.returncode == OK:
+            self.assertLess(stats["lights"][0]["verify"]["visibility_rms_error"], 0.01)
+            self.assertIn("fast", stats["lights"][0]["assumes"])
+        else:
+            self.assertEqual(result.returncode, USAGE)
+            self.assertIn("built without Embree", result.stderr)
+
+    def test_options_out_of_range_are_named(self):
+        result, _ = self.render("pcss", "--set", "pcss.search=0")
+        self.assertEqual(result.returncode, USAGE)
+        self.assertIn("pcss.search", result.stderr)
+
+
 class Signals(CommandLine):
     def wait_for_handler(self, process, number):
         """Until the program catches the signal; before, it just dies of it. Linux only, elsewhere a second must do."""

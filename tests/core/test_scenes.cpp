@@ -29,6 +29,7 @@ constexpr Case kCases[] = {
     {"fence", 0},      {"fence", 5},        {"fence_mesh", 0},   {"room", 0},    {"room", 1},   {"fence_mesh", 5},
     {"torus_knot", 0}, {"torus_knot", 300}, {"torus_knot", 777}, {"grass", 0},   {"grass", 1},  {"hairball", 0},
     {"hairball", 1},   {"field", 0},        {"field", 1},        {"sphere", 0},  {"sphere", 4}, {"sphere", 5},
+    {"glass", 0},      {"glass", 8},
 };
 
 bool all_finite(const dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
@@ -157,6 +158,7 @@ TEST_CASE("torus knot, sphere, hairs, core and animals are closed, consistently 
       {{"grass", 10}, {"stone"}},    {{"demo", 0}, {"knot"}},
       {{"demo", 0}, {"limestone"}},  {{"demo", 0}, {"clay"}},
       {{"demo", 0}, {"stem"}},       {{"demo", 0}, {"brass"}},
+      {{"glass", 8}, {"slab"}},      {{"glass", 8}, {"ball"}},
   };
   for (const auto& solid : solids) {
     CAPTURE(solid.scene.name);

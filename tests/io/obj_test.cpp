@@ -136,24 +136,56 @@ TEST_CASE("materials carry Kd, d, Tr and Tf, one after the other without influen
   CHECK(scene.materials[1].opacity == 0.75f);
   CHECK(scene.materials[2].diffuse == Material{}.diffuse);
   CHECK(scene.materials[2].opacity == 1.0f);
+  CHECK(scene.materials[1].transmittance == vec3(1.0f));
   CHECK(scene.triangle_materials == std::vector<std::uint32_t>{3, 0, 1, 2});
+  CHECK(scene.materials[0].translucent());
+  CHECK_FALSE(scene.materials[2].translucent());
+}
+
+TEST_CASE("map_Tf is a colour map of what passes, and makes a material clear unless d or Tr says otherwise") {
+  const Scratch scratch;
+  const std::vector<std::uint8_t> codes = {255, 0, 0, 10, 20, 30};
+  std::vector<float> values;
+  for (const std::uint8_t code : codes) values.push_back(static_cast<float>(code) / 255.0f);
+  write_png(scratch.path("glass.png"), 2, 1, 3, values, false, 8, {});
+  scratch.write("m.mtl",
+                "newmtl pane\nmap_Kd glass.png\nmap_Tf glass.png\nnewmtl dim\nTr 0.25\nTf 0.5\nmap_Tf -clamp off "
+                "glass.png\nnewmtl shut\nd 1\nmap_Tf glass.png\nnewmtl plain\n");
+  const auto obj = scratch.write(
+      "a.obj", std::string("mtllib m.mtl\n") + kTriangle + "vt 0 0\nusemtl pane\nf 1/1 2/1 3/1\nusemtl dim\nf 1 2 3\n");
+  ObjLoadReport report;
+  const Scene scene = load_obj(obj, {}, report);
+  CHECK(report.warnings.empty());
+  REQUIRE(scene.materials.size() == 4);
+  REQUIRE(scene.color_maps.size() == 1);
+  CHECK(scene.color_maps[0].rgb == codes);
+  CHECK(scene.materials[0].transmittance_map == 0);
+  CHECK(scene.materials[0].color_map == 0);
+  CHECK(scene.materials[0].opacity == 0.0f);
+  CHECK(scene.materials[1].transmittance_map == 0);
+  CHECK(scene.materials[1].opacity == 0.75f);
+  CHECK(scene.materials[1].transmittance == vec3(0.5f));
+  CHECK_FALSE(scene.materials[2].translucent());
+  CHECK(scene.materials[3].transmittance_map == kNone);
 }
 
 TEST_CASE("missing libraries, materials and textures are listed together, and are errors when strict") {
   const Scratch scratch;
-  scratch.write("m.mtl", "newmtl a\nmap_Kd gone.png\nmap_d -clamp on sub\\also gone.png\n");
+  scratch.write("m.mtl", "newmtl a\nmap_Kd gone.png\nmap_d -clamp on sub\\also gone.png\nmap_Tf lost.png\n");
   const auto obj = scratch.write(
       "a.obj", std::string("mtllib m.mtl none.mtl\nusemtl a\n") + kTriangle + "f 1 2 3\nusemtl b\nf 1 2 3\n");
   ObjLoadReport report;
   const Scene scene = load_obj(obj, {}, report);
-  CHECK(report.missing.size() == 4);
+  CHECK(report.missing.size() == 5);
+  CHECK(scene.materials[0].transmittance_map == kNone);
   CHECK(scene.materials[0].color_map == kNone);
   CHECK(scene.materials[0].alpha_map == kNone);
   CHECK(scene.triangle_materials == std::vector<std::uint32_t>{0, 1});
   const auto outcome = test::outcome_of([&] { load_obj(obj, {.strict = true}, report); });
   REQUIRE(outcome.threw);
   CHECK(outcome.code == ErrorCode::kBadInput);
-  for (const char* what : {"none.mtl", "'gone.png'", "also gone.png", "material 'b'"}) CHECK(outcome.has(what));
+  for (const char* what : {"none.mtl", "'gone.png'", "also gone.png", "lost.png", "material 'b'"})
+    CHECK(outcome.has(what));
 }
 
 TEST_CASE("a file named without a directory finds what lies beside it, and what is missing is missing") {

@@ -8,6 +8,7 @@
 #include "rasterizer/io/view_file.h"
 #include "rasterizer/rasterizer.h"
 #include "rasterizer/scenes/builtin.h"
+#include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
 #include "support/lit_scene.h"
@@ -44,11 +45,12 @@ Outcome check_scene(const Scene& scene, const View& view, std::uint32_t size, st
     solve_masks(mesh, receivers, light, light_samples, config, other, stats);
     outcome.methods_agree = outcome.methods_agree && other.words == masks.words;
   }
+  const OpaqueMesh opaque(mesh);
   outcome.receivers = receivers.size();
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     if (hash32(static_cast<std::uint32_t>(i), 1) % every != 0) continue;
     std::vector<std::uint64_t> truth(masks.words_per_receiver, 0);
-    oracle_mask(mesh, receivers, i, light_samples, truth);
+    oracle_mask(opaque.get(), receivers, i, light_samples, truth);
     for (std::size_t w = 0; w < truth.size(); ++w) {
       outcome.wrong += static_cast<std::uint64_t>(std::popcount(truth[w] ^ masks.mask(i)[w]));
       outcome.blocked += static_cast<std::uint64_t>(std::popcount(truth[w]));

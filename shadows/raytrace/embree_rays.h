@@ -1,4 +1,5 @@
-// The rival: every (receiver, light sample) segment as an occlusion ray of Embree 3, in its fastest ways.
+// The rival, and method raytrace: every (receiver, light sample) segment as an occlusion ray of Embree 3, in its
+// fastest ways.
 #pragma once
 
 #include <memory>
@@ -7,7 +8,7 @@
 #include "halfshade/shadows.h"
 #include "shadows/receivers.h"
 
-namespace halfshade::bench {
+namespace halfshade {
 
 enum class BuildQuality { kLow, kMedium, kHigh };
 
@@ -28,12 +29,16 @@ struct EmbreeMode {
 /// All modes that make sense for `sample_count` samples.
 std::vector<EmbreeMode> embree_modes(std::uint32_t sample_count);
 
+/// The one that is fastest on most scenes (docs/performance.md): 16 samples of one receiver per packet, in square
+/// blocks of the light where the number of samples allows.
+EmbreeMode best_embree_mode(std::uint32_t sample_count, bool robust);
+
 /// One scene with its trees, and one light's receivers and samples, all of which must outlive this.
 ///
 /// Rays start at the receiver (tnear 0) and end just before the sample (tfar 1 - 2^-20). The receiver's own triangle is
-/// not excluded: receivers are lifted off it (all but a few, see README.md), and a filter callback for every hit would
-/// only slow Embree down.
-/// Alpha-tested triangles are a geometry of their own with an occlusion filter that looks up the nearest texel.
+/// not excluded: receivers are lifted off it (all but a few, see bench/README.md), and a filter callback for every hit
+/// would only slow Embree down. Alpha-tested triangles are a geometry of their own with an occlusion filter that looks
+/// up the nearest texel.
 class EmbreeRays {
  public:
   EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples, int threads);
@@ -54,4 +59,4 @@ class EmbreeRays {
 /// Is Embree part of this program?
 bool embree_available();
 
-}  // namespace halfshade::bench
+}  // namespace halfshade

@@ -1,4 +1,4 @@
-#include "embree_rays.h"
+#include "shadows/raytrace/embree_rays.h"
 
 #include <embree3/rtcore.h>
 
@@ -13,7 +13,7 @@
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/alpha.h"
 
-namespace halfshade::bench {
+namespace halfshade {
 namespace {
 
 constexpr float kTfar = 1.0f - 0x1p-20f;
@@ -275,6 +275,11 @@ std::vector<EmbreeMode> embree_modes(std::uint32_t sample_count) {
   return modes;
 }
 
+EmbreeMode best_embree_mode(std::uint32_t sample_count, bool robust) {
+  const PacketOrder order = grid_side(sample_count) == 0 ? PacketOrder::kSamples : PacketOrder::kSampleBlocks;
+  return {16, order, false, robust, BuildQuality::kMedium};
+}
+
 EmbreeRays::EmbreeRays(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
                        int threads)
     : state_(std::make_unique<State>(mesh, receivers, samples)) {
@@ -349,4 +354,4 @@ void EmbreeRays::trace(const EmbreeMode& mode, std::span<const std::uint32_t> or
 
 bool embree_available() { return true; }
 
-}  // namespace halfshade::bench
+}  // namespace halfshade

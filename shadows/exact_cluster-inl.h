@@ -1,0 +1,233 @@
+// What the exact engine does for every kind of sample arrangement, per instruction set: the cluster's shaft against the
+// tree of blockers, and 16 triangles of a leaf against one receiver up to their bounding rectangles on the light.
+// Included once per Highway target by exact_kernel.cpp (samples anywhere) and row_kernel.cpp (samples in rows).
+
+#if defined(HALFSHADE_EXACT_CLUSTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef HALFSHADE_EXACT_CLUSTER_INL_H_
+#undef HALFSHADE_EXACT_CLUSTER_INL_H_
+#else
+#define HALFSHADE_EXACT_CLUSTER_INL_H_
+#endif
+
+#include "shadows/edge_planes-inl.h"
+#include "shadows/exact_kernel.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace halfshade {
+namespace HWY_NAMESPACE {
+
+/// A rectangle in the light's plane.
+struct Rectangle {
+  float low_u = 1e30f, low_v = 1e30f, high_u = -1e30f, high_v = -1e30f;
+};
+
+/// Receivers as a box in the light's frame (a point for a single one), and what of the light they ask for.
+struct Shaft {
+  float low[3], high[3];
+  Rectangle light;  // padded for rounding
+};
+
+/// Rounding of a projection onto the light's plane: coordinates are below 4 and carry 1e-6, and the samples lie that
+/// near to the plane, which grazing receivers see magnified.
+HWY_INLINE float ProjectionPad(float z) { return 1e-5f + 2e-6f / z; }
+
+/// Which of the boxes can hold a point between the receivers and the light? Box and receivers project onto the light's
+/// plane as q = r + (p - r) k with k = z_r / (z_r - z_p); the extremes lie at extreme p, r and k.
+HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const float* const high[3], std::size_t i) {
+  const Tag d;
+  const Vec zero = hn::Zero(d), tiny = hn::Set(d, 1e-30f);
+  const Vec z_low = hn::Max(hn::LoadU(d, low[2] + i), zero), z_high = hn::LoadU(d, high[2] + i);
+  const Vec r_low = hn::Set(d, s.low[2]), r_high = hn::Set(d, s.high[2]);
+  const Vec near = hn::Div(r_high, hn::Max(hn::Sub(r_high, z_low), tiny));
+  const Vec far = hn::Div(r_low, hn::Max(hn::Sub(r_low, hn::Max(z_high, zero)), tiny));
+  LaneMask meets = hn::And(hn::Lt(z_low, r_high), hn::Ge(z_high, zero));
+  const float light_low[2] = {s.light.low_u, s.light.low_v}, light_high[2] = {s.light.high_u, s.light.high_v};
+  for (int k = 0; k < 2; ++k) {
+    const Vec a = hn::Set(d, s.low[k]), b = hn::Set(d, s.high[k]);
+    const Vec to_low = hn::Sub(hn::LoadU(d, low[k] + i), b), to_high = hn::Sub(hn::LoadU(d, high[k] + i), a);
+    const Vec q_low = hn::Add(b, hn::Min(hn::Mul(to_low, near), hn::Mul(to_low, far)));
+    const Vec q_high = hn::Add(a, hn::Max(hn::Mul(to_high, near), hn::Mul(to_high, far)));
+    meets = hn::And(meets, hn::And(hn::Le(q_low, hn::Set(d, light_high[k])), hn::Ge(q_high, hn::Set(d, light_low[k]))));
+  }
+  return meets;
+}
+
+/// Leaves whose box meets the cluster's shaft, into scratch.leaf.
+HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, ExactScratch& scratch) {
+  const std::size_t lanes = hn::Lanes(Tag());
+  scratch.leaf.clear();
+  for (int k = 0; k < 3; ++k) scratch.low[k].clear(), scratch.high[k].clear();
+  scratch.stack.assign(1, 0);
+  while (!scratch.stack.empty()) {
+    const BlockerTree::Node& node = tree.nodes[scratch.stack.back()];
+    scratch.stack.pop_back();
+    const float* const low[3] = {node.low[0], node.low[1], node.low[2]};
+    const float* const high[3] = {node.high[0], node.high[1], node.high[2]};
+    for (std::size_t i = 0; i < node.count; i += lanes) {
+      for (std::uint64_t bits = Bits(MeetsShaft(shaft, low, high, i)); bits != 0; bits &= bits - 1) {
+        const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
+        if (at >= node.count) continue;
+        if ((node.child[at] & BlockerTree::kLeafBit) == 0) {
+          scratch.stack.push_back(node.child[at]);
+          continue;
+        }
+        scratch.leaf.push_back(node.child[at] & ~BlockerTree::kLeafBit);
+        for (int k = 0; k < 3; ++k) {
+          scratch.low[k].push_back(node.low[k][at]);
+          scratch.high[k].push_back(node.high[k][at]);
+        }
+      }
+    }
+  }
+}
+
+/// Largest share of the light first: what hides much is tested before what hides little.
+HWY_INLINE void SortLeaves(const Shaft& shaft, ExactScratch& scratch) {
+  const std::size_t count = scratch.leaf.size();
+  scratch.keys.clear();
+  const float r[3] = {0.5f * (shaft.low[0] + shaft.high[0]), 0.5f * (shaft.low[1] + shaft.high[1]),
+                      0.5f * (shaft.low[2] + shaft.high[2])};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const float z = 0.5f * (std::max(scratch.low[2][i], 0.0f) + scratch.high[2][i]);
+    const float k = r[2] / std::max(r[2] - z, 1e-6f);
+    float area = 1.0f;
+    const float light_low[2] = {shaft.light.low_u, shaft.light.low_v},
+                light_high[2] = {shaft.light.high_u, shaft.light.high_v};
+    for (int axis = 0; axis < 2; ++axis) {
+      const float a = std::max(r[axis] + (scratch.low[axis][i] - r[axis]) * k, light_low[axis]);
+      const float b = std::min(r[axis] + (scratch.high[axis][i] - r[axis]) * k, light_high[axis]);
+      area *= std::max(b - a, 0.0f);
+    }
+    scratch.keys.emplace_back(-area, i);
+  }
+  std::sort(scratch.keys.begin(), scratch.keys.end());
+  const auto reorder = [&](auto& values) {
+    auto old = values;
+    for (std::size_t i = 0; i < count; ++i) values[i] = old[scratch.keys[i].second];
+  };
+  reorder(scratch.leaf);
+  for (int k = 0; k < 3; ++k) {
+    reorder(scratch.low[k]), reorder(scratch.high[k]);
+    scratch.low[k].resize(count + kMaxLanes, 1e30f);  // padding: boxes that no shaft meets
+    scratch.high[k].resize(count + kMaxLanes, -1e30f);
+  }
+}
+
+HWY_INLINE LaneMask LanesFromBits(std::uint32_t bits, std::size_t first) {
+  const Tag d;
+  std::uint8_t bytes[8] = {};
+  const std::uint32_t shifted = bits >> first;
+  hwy::CopyBytes<4>(&shifted, bytes);
+  return hn::LoadMaskBits(d, bytes);
+}
+
+HWY_INLINE bool OutsideBox(const vec3& p, const BlockerTree::Leaf& leaf) {
+  return p.x < leaf.box_low.x || p.y < leaf.box_low.y || p.z < leaf.box_low.z || p.x > leaf.box_high.x ||
+         p.y > leaf.box_high.y || p.z > leaf.box_high.z;
+}
+
+/// Lanes of a leaf that could hide something from a receiver: not its own triangle, facing so that some sample lies on
+/// the other side of the plane. Fills what `pairs` needs for the edges later; returns the lanes as bits.
+HWY_INLINE std::uint64_t FacingLanes(const BlockerTree::Leaf& leaf, std::size_t i, const vec3& position,
+                                     std::uint32_t own, PairLanes& pairs, std::array<Vec3, 3>& corner) {
+  const Tag d;
+  const UintTag du;
+  const Vec3 r = Splat(position);
+  const std::uint32_t no_front = OutsideBox(position, leaf) ? leaf.back_faces_only : 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    corner[k] = {hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i),
+                 hn::LoadU(d, leaf.corner[k][2] + i)};
+    pairs.to_corner[k] = Subtract(corner[k], r);
+  }
+  const Vec3 normal{hn::LoadU(d, leaf.normal[0] + i), hn::LoadU(d, leaf.normal[1] + i),
+                    hn::LoadU(d, leaf.normal[2] + i)};
+  const Vec side = Dot(normal, pairs.to_corner[0]);
+  const Vec side_error = hn::Mul(hn::LoadU(d, leaf.side_error + i), Norm1(pairs.to_corner[0]));
+  const LaneMask above = hn::Gt(side, side_error);
+  pairs.below = hn::Lt(side, hn::Neg(side_error));
+  pairs.unknown = hn::Not(hn::Or(above, pairs.below));
+  const LaneMask facing =
+      hn::Or(pairs.unknown, hn::Or(hn::And(above, LanesFromBits(leaf.samples_above, i)),
+                                   hn::And(pairs.below, LanesFromBits(leaf.samples_below & ~no_front, i))));
+  const auto other = hn::Ne(hn::LoadU(du, leaf.triangle + i), hn::Set(du, own));
+  pairs.active = hn::And(hn::And(hn::FirstN(d, leaf.count - i), facing), hn::RebindMask(d, other));
+  return Bits(pairs.active);
+}
+
+/// Edges, and the way from the receiver to the light, of the lanes that FacingLanes set up.
+HWY_INLINE void SetEdges(const KernelSamples& samples, const vec3& position, const std::array<Vec3, 3>& corner,
+                         PairLanes& pairs) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    pairs.edge[k] = Subtract(corner[(k + 1) % 3], corner[k]);
+    pairs.edge_error[k] = hn::Mul(hn::Set(Tag(), kDeterminantError), Norm1(pairs.edge[k]));
+  }
+  pairs.to_center = Subtract(Splat(samples.center), Splat(position));
+  pairs.distance = hn::Add(NormMax(pairs.to_center), hn::Set(Tag(), samples.reach));
+}
+
+/// Bounding rectangles of the lanes' triangles, projected onto the light's plane and widened for rounding. A triangle
+/// that reaches the receiver's height has no bounded projection.
+struct ProjectedLanes {
+  Vec low[2], high[2];
+  LaneMask bounded;
+};
+
+/// The way to a corner is within 5 units of 2^-24 of its length, and so is its height, by which the projection divides.
+/// Corners that project farther than 4 from the receiver may err by more: they still lie beyond every light.
+HWY_INLINE ProjectedLanes ProjectTriangles(const LightFrame& frame, const std::array<Vec3, 3>& to_corner,
+                                           const Shaft& receiver) {
+  const Tag d;
+  const float r[3] = {receiver.low[0], receiver.low[1], receiver.low[2]};
+  const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, down = Splat(vec3(-frame.n));
+  ProjectedLanes p;
+  p.low[0] = p.low[1] = hn::Set(d, 1e30f);
+  p.high[0] = p.high[1] = hn::Set(d, -1e30f);
+  Vec least = hn::Set(d, 1e30f), farthest = hn::Zero(d);  // height below the receiver; length of the way
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec below = Dot(to_corner[k], down);
+    least = hn::Min(least, below);
+    farthest = hn::Max(farthest, Norm1(to_corner[k]));
+    const Vec scale = hn::Div(hn::Set(d, r[2]), below);
+    for (int axis = 0; axis < 2; ++axis) {
+      const Vec q = hn::MulAdd(Dot(to_corner[k], axes[axis]), scale, hn::Set(d, r[axis]));
+      p.low[axis] = hn::Min(p.low[axis], q);
+      p.high[axis] = hn::Max(p.high[axis], q);
+    }
+  }
+  const Vec magnified = hn::Div(hn::Mul(farthest, hn::Set(d, 1e-6f * (r[2] + 4.0f))), least);
+  const Vec pad = hn::Add(magnified, hn::Set(d, ProjectionPad(r[2])));
+  p.bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
+  for (int axis = 0; axis < 2; ++axis) {
+    p.low[axis] = hn::Sub(p.low[axis], pad), p.high[axis] = hn::Add(p.high[axis], pad);
+  }
+  return p;
+}
+
+/// Leaves that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
+/// the receivers are lit.
+HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size_t end,
+                           const KernelReceivers& receivers, ExactScratch& scratch) {
+  Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};
+  for (std::size_t i = begin; i < end; ++i) {
+    const vec3 p(scene.frame.to_frame(dvec3(receivers.x[i], receivers.y[i], receivers.z[i])));
+    for (int k = 0; k < 3; ++k)
+      shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
+  }
+  const vec2 low = scene.rectangles->whole_low, high = scene.rectangles->whole_high;
+  const float pad = ProjectionPad(shaft.low[2]);
+  shaft.light = {low.x - pad, low.y - pad, high.x + pad, high.y + pad};
+  CollectLeaves(*scene.tree, shaft, scratch);
+  scratch.leaves_listed += scratch.leaf.size();
+  if (scratch.leaf.empty()) {
+    ++scratch.clusters_lit;
+    return false;
+  }
+  SortLeaves(shaft, scratch);
+  return true;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace halfshade
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard

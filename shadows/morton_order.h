@@ -1,0 +1,41 @@
+// Points along a Morton curve, so that runs of them are compact.
+#pragma once
+
+#include "halfshade/types.h"
+#include "rasterizer/core/parallel.h"
+
+namespace halfshade {
+
+/// 10 bits of x with two zero bits between each.
+inline std::uint32_t spread_bits(std::uint32_t x) {
+  x = (x | x << 16) & 0x030000ffu;
+  x = (x | x << 8) & 0x0300f00fu;
+  x = (x | x << 4) & 0x030c30c3u;
+  return (x | x << 2) & 0x09249249u;
+}
+
+/// Indices of the points for which keep(index) holds, by their place among 1024^3 cells of the box around all points;
+/// within a cell by index.
+template <class Keep>
+std::vector<std::uint32_t> morton_order(std::span<const vec3> points, const Keep& keep) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> keys;
+  keys.reserve(points.size());
+  vec3 low(2.0f), high(-2.0f);
+  for (const vec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
+  const vec3 scale = 1023.0f / glm::max(high - low, vec3(1e-30f));
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    if (!keep(i)) continue;
+    const vec3 q = (points[i] - low) * scale;
+    const std::uint32_t code = spread_bits(static_cast<std::uint32_t>(q.x)) |
+                               spread_bits(static_cast<std::uint32_t>(q.y)) << 1 |
+                               spread_bits(static_cast<std::uint32_t>(q.z)) << 2;
+    keys.emplace_back(code, i);
+  }
+  parallel_sort(keys, [](const auto& a, const auto& b) { return a < b; });
+  std::vector<std::uint32_t> order;
+  order.reserve(keys.size());
+  for (const auto& key : keys) order.push_back(key.second);
+  return order;
+}
+
+}  // namespace halfshade

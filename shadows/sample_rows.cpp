@@ -1,0 +1,68 @@
+#include "shadows/sample_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace halfshade {
+namespace {
+
+/// Samples per row if every row of every set has the same number at one height, else 0.
+std::uint32_t columns_of(const LightSamples& light) {
+  if (light.st.empty() || !light.flat || !light.outline.empty()) return 0;
+  std::uint32_t columns = 1;
+  while (columns < light.count && light.st[columns].y == light.st[0].y) ++columns;
+  if (light.count % columns != 0) return 0;
+  for (std::size_t i = 0; i < light.st.size(); ++i) {
+    if (light.st[i].y != light.st[i / columns * columns].y) return 0;
+  }
+  return columns;
+}
+
+/// Row heights and shifts as the samples themselves have them: the mean of a row takes out most of their rounding.
+void add_row(std::span<const vec3> row, const KernelSamples& samples, const LightFrame& frame, SampleRows& rows) {
+  dvec3 sum(0.0);
+  for (const vec3& p : row) sum += frame.to_frame(dvec3(p));
+  const double n = static_cast<double>(row.size());
+  rows.y.push_back(static_cast<float>(sum.y / n));
+  rows.offset.push_back(static_cast<float>(0.5 * (n - 1.0) - sum.x / n * double{rows.scale}));
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const double x = (static_cast<double>(i) - double{rows.offset.back()}) / double{rows.scale};
+    const dvec3 place = dvec3(samples.center) + x * dvec3(rows.axis_x) + double{rows.y.back()} * dvec3(rows.axis_y);
+    const dvec3 error = glm::abs(place - dvec3(row[i]));
+    rows.deviation = std::max(rows.deviation, static_cast<float>(std::max({error.x, error.y, error.z}) * 1.001));
+  }
+}
+
+}  // namespace
+
+SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame) {
+  SampleRows rows;
+  const std::uint32_t columns = columns_of(light);
+  if (columns == 0 || columns > SampleRows::kMaxColumns || light.count / columns > SampleRows::kMaxRows) return rows;
+  rows.columns = columns;
+  rows.rows = light.count / columns;
+  rows.padded = (rows.rows + 15) / 16 * 16;
+  rows.axis_x = vec3(frame.u), rows.axis_y = vec3(frame.v);
+  const dvec3 first = frame.to_frame(dvec3(samples.points[0])),
+              last = frame.to_frame(dvec3(samples.points[columns - 1]));
+  const double pitch = columns > 1 ? (last.x - first.x) / (columns - 1.0) : 1.0;
+  if (!(pitch > 1e-7)) return SampleRows();
+  rows.scale = static_cast<float>(1.0 / pitch);
+  for (std::uint32_t set = 0; set < samples.sets; ++set) {
+    for (std::uint32_t row = 0; row < rows.rows; ++row) {
+      add_row(samples.set_points(set).subspan(row * columns, columns), samples, frame, rows);
+    }
+    rows.y.resize(std::size_t{set + 1} * rows.padded, rows.y.back());
+    rows.offset.resize(std::size_t{set + 1} * rows.padded, rows.offset.back());
+  }
+  rows.valid.assign(rows.padded, 0);
+  std::fill_n(rows.valid.begin(), rows.rows, ~0u >> (32 - columns));
+  const auto [least, most] = std::minmax_element(rows.offset.begin(), rows.offset.end());
+  rows.least_offset = *least, rows.most_offset = *most;
+  for (const float y : rows.y) rows.reach_y = std::max(rows.reach_y, std::fabs(y));
+  // Not a rectangle's rows after all (a skewed light, rows along another axis): the general way is made for those.
+  if (rows.deviation * rows.scale > 0.01f) return SampleRows();
+  return rows;
+}
+
+}  // namespace halfshade
