@@ -99,7 +99,7 @@ HWY_INLINE std::uint64_t LanesOverOpenSamples(const SampleRows& rows, const Proj
     const auto wanted = hn::Set(du, columns[lane]);
     for (std::size_t j = 0; j < rows.padded; j += hn::Lanes(d)) {
       const Vec y = hn::LoadU(d, r.y + j);
-      const auto open = hn::RebindMask(d, hn::TestBit(hn::Load(du, r.open + j), wanted));
+      const auto open = hn::RebindMask(d, hn::Ne(hn::And(hn::Load(du, r.open + j), wanted), hn::Zero(du)));
       if (hn::AllFalse(d, hn::And(open, hn::And(hn::Ge(y, lowest), hn::Le(y, highest))))) continue;
       kept |= std::uint64_t{1} << lane;
       break;

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "bench_case.h"
-#include "harness.h"
+#include "bench/bench_case.h"
+#include "bench/harness.h"
 #include "papers.h"
 #include "rasterizer/scenes/builtin.h"
 #include "shadows/solver.h"

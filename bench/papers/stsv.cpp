@@ -2,9 +2,9 @@
 // the memory of the light sample buffer. Times are those of the shadows alone: the solve's.
 #include <fmt/format.h>
 
-#include "bench_case.h"
+#include "bench/bench_case.h"
 #include "examples/halfshade/scene_source.h"
-#include "harness.h"
+#include "bench/harness.h"
 #include "papers.h"
 #include "shadows/solver.h"
 

@@ -45,7 +45,7 @@ enum class InfluenceOutline {
   kQuad,       // smallest rectangle around the hull
 };
 
-/// afsm, afsm-lut. Only `table` changes masks, and only those of afsm-lut.
+/// afsm, afsm-lut. No option changes a bit of afsm; the approximate masks of afsm-lut depend on all of them.
 struct AliasFreeOptions {
   InfluenceOutline region = InfluenceOutline::kHull;
   bool fit = true;               // grid over the receivers' slopes; otherwise over those of the whole scene

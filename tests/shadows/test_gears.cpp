@@ -59,17 +59,6 @@ Light shaped_light(LightShape shape, Random& random) {
 constexpr std::array kShapes = {LightShape::kPoint,   LightShape::kRectangle, LightShape::kDisk,   LightShape::kSphere,
                                 LightShape::kSamples, LightShape::kEllipsoid, LightShape::kPolygon};
 
-/// Tiny triangles close below the light (stability.md D3).
-std::vector<Triangle> swarm_at_light(Random& random, int count) {
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const dvec3 center(random.uniform(-1, 1), 4.0 - random.uniform(0.001, 0.01), random.uniform(-1, 1));
-    triangles.push_back({center + 1e-3 * random.in_box(-1, 1), center + 1e-3 * random.in_box(-1, 1),
-                         center + 1e-3 * random.in_box(-1, 1)});
-  }
-  return triangles;
-}
-
 }  // namespace
 
 TEST_CASE("a radix sort orders by key and keeps the order of equal keys") {
@@ -255,47 +244,6 @@ TEST_CASE("S16 for GEARS: as the light shrinks to a point, masks become the hard
     }
     CHECK(last == 0);
   }
-}
-
-TEST_CASE("S25 for GEARS: a swarm at the light stays within the pair budget and gives the oracle's masks") {
-  Random random(25);
-  const Scene scene = scene_of(swarm_at_light(random, 3000));
-  std::vector<dvec3> points;
-  for (int i = 0; i < 400; ++i) points.push_back({i % 20 * 0.5 - 5.0, 0.0, i / 20 * 0.5 - 5.0});
-  const std::vector<Receiver> receivers = receivers_at(points);
-  ShadowConfig config = frame_config(16);
-  config.gears.grid = 128;
-  const VisibilityMasks truth = solve(scene, receivers, frame_light(), config, ShadowMethod::kOracle);
-  for (const bool coarse : {false, true}) {
-    config.gears.coarse = coarse;
-    for (const std::uint32_t budget : {10u, 500u, 20000u}) {
-      config.gears.pair_budget = budget;
-      ShadowStats stats;
-      CHECK(wrong_bits(truth, gears(scene, receivers, config, &stats)) == 0);
-      CHECK(detail(stats, "pairs_in_flight_max") <= budget);
-      CHECK(detail(stats, "assignments") > 100000);  // more than any of the budgets, in cells
-      if (!coarse && budget == 20000u) CHECK(detail(stats, "batches") > 3);
-    }
-  }
-}
-
-TEST_CASE("S25 for GEARS: memory grows with the swarm's size, not with its product with the grid") {
-  Random random(26);
-  std::vector<dvec3> points;
-  for (int i = 0; i < 64; ++i) points.push_back({i % 8 - 3.5, 0.0, i / 8 - 3.5});
-  ShadowConfig config = frame_config(1);
-  config.gears.grid = 128;
-  config.gears.coarse = false;
-  std::array<double, 2> bytes{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    ShadowStats stats;
-    const Scene scene = scene_of(swarm_at_light(random, k == 0 ? 20000 : 40000));
-    gears(scene, receivers_at(points), config, &stats);
-    bytes[k] = static_cast<double>(stats.bytes);
-    CHECK(detail(stats, "pairs_in_flight_max") <= config.gears.pair_budget);
-  }
-  CHECK(bytes[0] < 100e6);
-  CHECK(bytes[1] < 2.1 * bytes[0]);
 }
 
 TEST_CASE("S24 for GEARS: a crowd in one cell is spread over cells of its own") {

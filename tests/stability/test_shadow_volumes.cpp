@@ -1,0 +1,87 @@
+// Named stability cases about perforated triangles finer than the samples, and about counting what lies in between.
+#include <doctest/doctest.h>
+
+#include "halfshade/depth_complexity.h"
+#include "support/lit_scene.h"
+
+using namespace halfshade;
+using namespace halfshade::test;
+
+namespace {
+
+DepthComplexity depth_of(const Scene& scene, const std::vector<dvec3>& points, std::uint32_t samples) {
+  DepthComplexity depth;
+  solve_depth_complexity(scene, receivers_at(points), frame_light(), frame_config(samples), depth);
+  return depth;
+}
+
+}  // namespace
+
+TEST_CASE("S04 split_quad: a segment through the edge that two quads share counts one surface") {
+  const auto halves = joined(quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}),
+                             quad({0, 2, -64}, {64, 2, -64}, {64, 2, 64}, {0, 2, 64}));
+  std::vector<dvec3> points;
+  for (int i = -64; i <= 64; ++i) points.push_back({i / 64.0, 0.0, (i % 16) / 16.0});
+  const DepthComplexity depth = depth_of(scene_of(halves), points, 256);
+  for (const std::uint32_t count : depth.counts) REQUIRE(count == 1);
+  for (std::size_t i = 0; i < points.size(); ++i) CHECK(depth.visibility(i) == 0.0f);
+  ShadowConfig config = frame_config(256);
+  config.stsv.opaque = OpaqueBlockers::kVolumes;
+  CHECK(wrong_bits_of_exact_methods(scene_of(halves), receivers_at(points), frame_light(), config) == 0);
+}
+
+TEST_CASE("S28 wedge_overlap: two quads that hide the same half of the light leave the other half") {
+  // Both hide the samples with x < 0 from the origin.
+  const auto quads = joined(quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}),
+                            quad({-64, 2.5, -64}, {0, 2.5, -64}, {0, 2.5, 64}, {-64, 2.5, 64}));
+  const DepthComplexity depth = depth_of(scene_of(quads), {{0, 0, 0}}, 256);
+  CHECK(depth.visibility(0) == 0.5f);
+  std::uint32_t sum = 0;
+  for (const std::uint32_t count : depth.counts) sum += count;
+  CHECK(sum == 2 * 128);
+}
+
+namespace {
+
+/// B6: bars of a period of 1/64, half of it opaque, at y = 3.5.
+Scene bars() {
+  Scene scene = scene_of(quad({-16, 3.5, -16}, {16, 3.5, -16}, {16, 3.5, 16}, {-16, 3.5, 16}));
+  scene.alpha_maps.push_back({"bars", 2, 1, {255, 0}});
+  scene.materials[0].alpha_map = 0;
+  const float repeats = 32.0f * 64.0f;
+  scene.triangle_uvs = {{vec2(0, 0), vec2(repeats, 0), vec2(repeats, 1)}, {vec2(0, 0), vec2(repeats, 1), vec2(0, 1)}};
+  return scene;
+}
+
+std::vector<dvec3> sweep_points() {  // one period of the shadow: the bars' own, times 4 / 0.5
+  std::vector<dvec3> points;
+  for (int i = 0; i < 256; ++i) points.push_back({i / 256.0 / 8.0, 0.0, 0.013});
+  return points;
+}
+
+double amplitude(const std::vector<float>& v) {
+  return double{*std::max_element(v.begin(), v.end())} - double{*std::min_element(v.begin(), v.end())};
+}
+
+std::vector<float> visibility_of(const Scene& scene, const std::vector<dvec3>& points, const ShadowConfig& config) {
+  ShadowConfig c = config;
+  c.method = ShadowMethod::kSoftTexturedShadowVolumes;
+  std::vector<float> visibility;
+  solve_visibility(scene, receivers_at(points), frame_light(), c, visibility);
+  return visibility;
+}
+
+}  // namespace
+
+TEST_CASE("S21 fence_minify: bars finer than the samples: nearest is the oracle's, filtered does not flicker") {
+  const Scene scene = bars();
+  const std::vector<dvec3> points = sweep_points();
+  ShadowConfig config = frame_config(256);
+  CHECK(wrong_bits_of_exact_methods(scene, receivers_at(points), frame_light(), config) == 0);
+  const double nearest = amplitude(visibility_of(scene, points, config));
+  CHECK(nearest > 0.3);  // so the case is one
+  config.stsv.filter = OpacityFilter::kFiltered;
+  const std::vector<float> filtered = visibility_of(scene, points, config);
+  CHECK(amplitude(filtered) <= 0.10);
+  for (const float v : filtered) CHECK(v == doctest::Approx(0.5).epsilon(0.1));
+}
