@@ -169,23 +169,24 @@ TexelLookup::TexelLookup(const TexturedTriangle& triangle, const vec3& receiver)
     const dvec3 weight = glm::cross(a, b);
     const double u = static_cast<double>(triangle.u[i]) * (triangle.width / kUvUnitsPerOne);
     const double v = static_cast<double>(triangle.v[i]) * (triangle.height / kUvUnitsPerOne);
-    u_ += weight * u, v_ += weight * v, sum_ += weight;
+    planes_.u += weight * u, planes_.v += weight * v, planes_.sum += weight;
     size += norm1(a) * norm1(b);
     reach = std::max({reach, std::fabs(u), std::fabs(v)});
   }
   // Each term is a product of three or four factors with one rounding each, summed: below 12 units of 2^-53 of the sum
   // of magnitudes, for numerator (times the largest coordinate) and denominator alike; 16 with room.
-  error_ = 16.0 * 0x1p-53 * size;
-  texel_reach_ = reach;
+  planes_.error = 16.0 * 0x1p-53 * size;
+  planes_.reach = reach;
 }
 
 std::array<std::uint32_t, 2> TexelLookup::texel(const vec3& l, std::uint64_t& exact_fallbacks) const {
   const dvec3 s = dvec3(l) - dvec3(receiver_);
-  const double sum = glm::dot(sum_, s), spread = error_ * (std::fabs(s.x) + std::fabs(s.y) + std::fabs(s.z));
-  const double error = texel_reach_ * (2.0 * spread / std::fabs(sum) + 8.0 * 0x1p-53) * 2.0;
+  const double sum = glm::dot(planes_.sum, s),
+               spread = planes_.error * (std::fabs(s.x) + std::fabs(s.y) + std::fabs(s.z));
+  const double error = planes_.reach * (2.0 * spread / std::fabs(sum) + 8.0 * 0x1p-53) * 2.0;
   if (!(std::fabs(sum) > 4.0 * spread)) return texel_at_hit(triangle_, receiver_, l, &exact_fallbacks);
   // Near a mean of the corners' coordinates, which are below 2^46 texels: they fit into integers.
-  const double u = glm::dot(u_, s) / sum, v = glm::dot(v_, s) / sum;
+  const double u = glm::dot(planes_.u, s) / sum, v = glm::dot(planes_.v, s) / sum;
   const std::int64_t column = floor_of(u), up = floor_of(v);
   const double in_column = u - static_cast<double>(column), in_row = v - static_cast<double>(up);
   const double from_border = std::min({in_column, 1.0 - in_column, in_row, 1.0 - in_row});

@@ -54,11 +54,18 @@ class TexelLookup {
   /// Requires blocks(corners, receiver, l).
   std::array<std::uint32_t, 2> texel(const vec3& l, std::uint64_t& exact_fallbacks) const;
 
+  /// Coordinate = dot(u, l - r) / dot(sum, l - r), in texels; numerators and denominator are within error |l - r|_1,
+  /// times `reach` (largest coordinate of a corner) for the numerators.
+  struct Planes {
+    dvec3 u{0.0}, v{0.0}, sum{0.0};
+    double error = 0.0, reach = 0.0;
+  };
+  const Planes& planes() const { return planes_; }
+
  private:
   const TexturedTriangle& triangle_;
   vec3 receiver_;
-  dvec3 u_{0.0}, v_{0.0}, sum_{0.0};  // coordinate = dot(u_, l - r) / dot(sum_, l - r), in texels
-  double error_, texel_reach_;
+  Planes planes_;
 };
 
 class AlphaLookup {

@@ -4,12 +4,15 @@
 // An edge's plane m . (l - c) + d, with l = c + x X + y Y, is zero in row y at x = p + q y. With the error bound e of
 // visibility_pair.h the sign is certain where |x - (p + q y)| > e / |m . X|; the slack added to that covers the
 // rounding of p, q and of the row's columns. Samples in between go to the exact predicate.
+#include <optional>
+
 #include "shadows/exact_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shadows/row_kernel.cpp"
 #include <hwy/foreach_target.h>
 
+#include "shadows/alpha_lookup-inl.h"
 #include "shadows/exact_cluster-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -224,24 +227,33 @@ HWY_INLINE hn::Vec<UintTag> Between(const SampleRows& rows, const Limits& limits
                         hn::Min(at(high, limits.high[0]), at(high, limits.high[1])));
 }
 
-/// Doubtful and perforated samples of the rows from j on; `possible` and `inside` are per row.
-HWY_INLINE void SettleRows(const ExactScene& scene, const Blocker& blocker, std::size_t j, const RowReceiver& r,
-                           const std::uint32_t* possible, std::uint32_t* inside, KernelCounters& counters) {
-  const std::size_t columns = scene.rows->columns;
-  for (std::size_t i = 0; i < hn::Lanes(Tag()) && j + i < scene.rows->rows; ++i) {
-    const std::uint32_t doubtful = possible[i] & ~inside[i];
-    if (doubtful == 0 && !(blocker.perforated && inside[i] != 0)) continue;
-    const std::size_t first = r.first_sample + (j + i) * columns;
-    inside[i] = static_cast<std::uint32_t>(settle_samples(
-        blocker, r.position, {scene.samples->points.data() + first, columns}, inside[i], doubtful, counters));
-  }
-}
-
 /// The light shows on both sides of the triangle's plane; it is alpha-tested; the rest of it, which is far in memory.
 struct RowTriangle {
   bool own_plane, perforated;
   const Blocker* blocker;
 };
+
+/// Doubtful and perforated samples of the rows from j on; `possible` and `inside` are per row. `texels` is made for the
+/// first row that needs it.
+HWY_INLINE void SettleRows(const ExactScene& scene, const RowTriangle& triangle, std::size_t j, const RowReceiver& r,
+                           const std::uint32_t* possible, std::uint32_t* inside, std::optional<TexelLookup>& texels,
+                           KernelCounters& counters) {
+  const SampleRows& rows = *scene.rows;
+  const auto& [a, b, c] = triangle.blocker->corner;
+  for (std::size_t i = 0; i < hn::Lanes(Tag()) && j + i < rows.rows; ++i) {
+    const std::size_t first = r.first_sample + (j + i) * rows.columns;
+    for (std::uint32_t doubtful = possible[i] & ~inside[i]; doubtful != 0; doubtful &= doubtful - 1) {
+      const auto bit = static_cast<std::size_t>(std::countr_zero(doubtful));
+      ++counters.exact_fallbacks;
+      inside[i] |= std::uint32_t{blocks(a, b, c, r.position, scene.samples->points[first + bit])} << bit;
+    }
+    if (!triangle.perforated || inside[i] == 0) continue;
+    const AlphaTriangle& alpha = *triangle.blocker->alpha;
+    if (!texels) texels.emplace(alpha, r.position);
+    inside[i] = OpaqueSamples(alpha, *texels, r.position, &rows.point_x[first], &rows.point_y[first],
+                              &rows.point_z[first], inside[i], counters.exact_fallbacks);
+  }
+}
 
 /// One triangle into the receiver's picture; true where samples were blocked.
 HWY_INLINE bool RasterizeTriangle(const ExactScene& scene, const RowTriangle& triangle, const RowEdges& edges,
@@ -251,6 +263,7 @@ HWY_INLINE bool RasterizeTriangle(const ExactScene& scene, const RowTriangle& tr
   const SampleRows& rows = *scene.rows;
   const std::size_t way = (edges.up[0] >> lane & 1) | (edges.up[1] >> lane & 1) << 1 | (edges.up[2] >> lane & 1) << 2;
   const bool bounded = way != 0 && way != 7;
+  std::optional<TexelLookup> texels;
   bool added = false;
   for (std::size_t j = 0; j < rows.padded; j += hn::Lanes(d)) {
     const Vec y = hn::LoadU(d, r.y + j), offset = hn::LoadU(d, r.offset + j);
@@ -270,7 +283,7 @@ HWY_INLINE bool RasterizeTriangle(const ExactScene& scene, const RowTriangle& tr
     if (triangle.perforated || !hn::AllTrue(du, hn::Eq(bits.possible, bits.inside))) {
       alignas(HWY_MAX_BYTES) std::uint32_t possible[kMaxLanes], inside[kMaxLanes];
       hn::Store(bits.possible, du, possible), hn::Store(bits.inside, du, inside);
-      SettleRows(scene, *triangle.blocker, j, r, possible, inside, counters);
+      SettleRows(scene, triangle, j, r, possible, inside, texels, counters);
       blocked = hn::Load(du, inside);
       if (hn::AllTrue(du, hn::Eq(blocked, hn::Zero(du)))) continue;
     }

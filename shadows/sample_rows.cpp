@@ -55,6 +55,10 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
     rows.y.resize(std::size_t{set + 1} * rows.padded, rows.y.back());
     rows.offset.resize(std::size_t{set + 1} * rows.padded, rows.offset.back());
   }
+  for (const vec3& p : samples.points) {
+    rows.point_x.push_back(p.x), rows.point_y.push_back(p.y), rows.point_z.push_back(p.z);
+  }
+  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(values->size() + 16);
   rows.valid.assign(rows.padded, 0);
   std::fill_n(rows.valid.begin(), rows.rows, ~0u >> (32 - columns));
   const auto [least, most] = std::minmax_element(rows.offset.begin(), rows.offset.end());

@@ -15,9 +15,11 @@ struct SampleRows {
   vec3 axis_x{1, 0, 0}, axis_y{0, 1, 0};
   float scale = 1.0f;  // columns per unit of length
   float least_offset = 0.0f, most_offset = 0.0f;
-  float reach_y = 0.0f;              // max |y|
-  float deviation = 0.0f;            // max |coordinate| between a sample and its place by the formula above
-  std::vector<float> y, offset;      // [set][padded]
+  float reach_y = 0.0f;                          // max |y|
+  float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
+  std::vector<float> y, offset;                  // [set][padded]
+  std::vector<float> point_x, point_y, point_z;  // [set][KernelSamples::padded] the samples themselves, lattice; with
+                                                 // room for 16 more to be read
   std::vector<std::uint32_t> valid;  // [padded]: bits of real samples
 
   bool empty() const { return rows == 0; }
