@@ -31,23 +31,40 @@ struct Shaft {
 /// near to the plane, which grazing receivers see magnified.
 HWY_INLINE float ProjectionPad(float z) { return 1e-5f + 2e-6f / z; }
 
-/// Which of the boxes can hold a point between the receivers and the light? Box and receivers project onto the light's
-/// plane as q = r + (p - r) k with k = z_r / (z_r - z_p); the extremes lie at extreme p, r and k.
-HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const float* const high[3], std::size_t i) {
+/// Rectangles on the light's plane.
+struct LaneRectangles {
+  Vec low[2], high[2];
+};
+
+/// Where boxes project to, as seen by any of the receivers; the lanes whose box reaches between the receivers and the
+/// light. Box and receivers project onto the light's plane as q = r + (p - r) k with k = z_r / (z_r - z_p); the
+/// extremes lie at extreme p, r and k.
+HWY_INLINE LaneMask ProjectBoxes(const Shaft& s, const float* const low[3], const float* const high[3], std::size_t i,
+                                 LaneRectangles& q) {
   const Tag d;
   const Vec zero = hn::Zero(d), tiny = hn::Set(d, 1e-30f);
   const Vec z_low = hn::Max(hn::LoadU(d, low[2] + i), zero), z_high = hn::LoadU(d, high[2] + i);
   const Vec r_low = hn::Set(d, s.low[2]), r_high = hn::Set(d, s.high[2]);
   const Vec near = hn::Div(r_high, hn::Max(hn::Sub(r_high, z_low), tiny));
   const Vec far = hn::Div(r_low, hn::Max(hn::Sub(r_low, hn::Max(z_high, zero)), tiny));
-  LaneMask meets = hn::And(hn::Lt(z_low, r_high), hn::Ge(z_high, zero));
-  const float light_low[2] = {s.light.low_u, s.light.low_v}, light_high[2] = {s.light.high_u, s.light.high_v};
   for (int k = 0; k < 2; ++k) {
     const Vec a = hn::Set(d, s.low[k]), b = hn::Set(d, s.high[k]);
     const Vec to_low = hn::Sub(hn::LoadU(d, low[k] + i), b), to_high = hn::Sub(hn::LoadU(d, high[k] + i), a);
-    const Vec q_low = hn::Add(b, hn::Min(hn::Mul(to_low, near), hn::Mul(to_low, far)));
-    const Vec q_high = hn::Add(a, hn::Max(hn::Mul(to_high, near), hn::Mul(to_high, far)));
-    meets = hn::And(meets, hn::And(hn::Le(q_low, hn::Set(d, light_high[k])), hn::Ge(q_high, hn::Set(d, light_low[k]))));
+    q.low[k] = hn::Add(b, hn::Min(hn::Mul(to_low, near), hn::Mul(to_low, far)));
+    q.high[k] = hn::Add(a, hn::Max(hn::Mul(to_high, near), hn::Mul(to_high, far)));
+  }
+  return hn::And(hn::Lt(z_low, r_high), hn::Ge(z_high, zero));
+}
+
+/// Which of the boxes can hold a point between the receivers and the light?
+HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const float* const high[3], std::size_t i) {
+  const Tag d;
+  LaneRectangles q;
+  LaneMask meets = ProjectBoxes(s, low, high, i, q);
+  const float light_low[2] = {s.light.low_u, s.light.low_v}, light_high[2] = {s.light.high_u, s.light.high_v};
+  for (int k = 0; k < 2; ++k) {
+    meets = hn::And(meets,
+                    hn::And(hn::Le(q.low[k], hn::Set(d, light_high[k])), hn::Ge(q.high[k], hn::Set(d, light_low[k]))));
   }
   return meets;
 }
@@ -167,8 +184,7 @@ HWY_INLINE void SetEdges(const KernelSamples& samples, const vec3& position, con
 
 /// Bounding rectangles of the lanes' triangles, projected onto the light's plane and widened for rounding. A triangle
 /// that reaches the receiver's height has no bounded projection.
-struct ProjectedLanes {
-  Vec low[2], high[2];
+struct ProjectedLanes : LaneRectangles {
   LaneMask bounded;
 };
 

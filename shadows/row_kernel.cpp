@@ -74,41 +74,67 @@ HWY_INLINE bool AnyOpen(const SampleRows& rows, const RowReceiver& r) {
   return any != 0;
 }
 
-/// Of the lanes in `active`, those whose rectangle on the light holds an open sample.
-HWY_INLINE std::uint64_t LanesOverOpenSamples(const SampleRows& rows, const ProjectedLanes& projected,
-                                              std::uint64_t active, const RowReceiver& r) {
+/// Of the lanes in `active`, those whose rectangle on the light may hold an open sample.
+HWY_INLINE std::uint64_t LanesOverOpenSamples(const SampleRows& rows, const LaneRectangles& q, std::uint64_t active,
+                                              const RowReceiver& r) {
   const Tag d;
   const UintTag du;
   const Rectangle& light = r.shaft.light;
-  const LaneMask meets = hn::And(
-      hn::And(hn::Le(projected.low[0], hn::Set(d, light.high_u)), hn::Ge(projected.high[0], hn::Set(d, light.low_u))),
-      hn::And(hn::Le(projected.low[1], hn::Set(d, light.high_v)), hn::Ge(projected.high[1], hn::Set(d, light.low_v))));
-  active &= Bits(hn::Or(meets, hn::Not(projected.bounded)));
+  active &=
+      Bits(hn::And(hn::And(hn::Le(q.low[0], hn::Set(d, light.high_u)), hn::Ge(q.high[0], hn::Set(d, light.low_u))),
+                   hn::And(hn::Le(q.low[1], hn::Set(d, light.high_v)), hn::Ge(q.high[1], hn::Set(d, light.low_v)))));
   if (active == 0) return 0;
-  alignas(HWY_MAX_BYTES) float low[kMaxLanes], high[kMaxLanes];
+  alignas(HWY_MAX_BYTES) float low[2][kMaxLanes], high[2][kMaxLanes];
   alignas(HWY_MAX_BYTES) std::uint32_t columns[kMaxLanes];
-  const Vec far = hn::Set(d, 1e30f), scale = hn::Set(d, rows.scale);
-  hn::Store(hn::IfThenElse(projected.bounded, projected.low[1], hn::Neg(far)), d, low);
-  hn::Store(hn::IfThenElse(projected.bounded, projected.high[1], far), d, high);
-  const Vec from = hn::MulAdd(projected.low[0], scale, hn::Set(d, rows.least_offset - 1e-3f));
-  const Vec to = hn::MulAdd(projected.high[0], scale, hn::Set(d, rows.most_offset + 1e-3f));
-  hn::Store(
-      hn::IfThenElse(hn::RebindMask(du, projected.bounded), BitRange(hn::Ceil(from), hn::Floor(to)), hn::Set(du, ~0u)),
-      du, columns);
+  const Vec scale = hn::Set(d, rows.scale), slack = hn::Set(d, 1e-3f);
+  const Vec from = hn::MulSub(q.low[0], scale, slack), to = hn::MulAdd(q.high[0], scale, slack);
+  hn::Store(from, d, low[0]), hn::Store(to, d, high[0]);
+  hn::Store(q.low[1], d, low[1]), hn::Store(q.high[1], d, high[1]);
+  hn::Store(BitRange(hn::Ceil(hn::Add(from, hn::Set(d, rows.least_offset))),
+                     hn::Floor(hn::Add(to, hn::Set(d, rows.most_offset)))),
+            du, columns);
   std::uint64_t kept = 0;
   for (std::uint64_t rest = active; rest != 0; rest &= rest - 1) {
     const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    const Vec lowest = hn::Set(d, low[lane]), highest = hn::Set(d, high[lane]);
     const auto wanted = hn::Set(du, columns[lane]);
     for (std::size_t j = 0; j < rows.padded; j += hn::Lanes(d)) {
       const Vec y = hn::LoadU(d, r.y + j);
-      const auto open = hn::RebindMask(d, hn::Ne(hn::And(hn::Load(du, r.open + j), wanted), hn::Zero(du)));
-      if (hn::AllFalse(d, hn::And(open, hn::And(hn::Ge(y, lowest), hn::Le(y, highest))))) continue;
+      const auto open = hn::And(hn::Load(du, r.open + j), wanted);  // columns of any row: shifts are left out
+      const auto in_rows =
+          hn::RebindMask(du, hn::And(hn::Ge(y, hn::Set(d, low[1][lane])), hn::Le(y, hn::Set(d, high[1][lane]))));
+      const auto near = hn::IfThenElseZero(in_rows, open);
+      if (hn::AllTrue(du, hn::Eq(near, hn::Zero(du)))) continue;
+      const Vec offset = hn::LoadU(d, r.offset + j);
+      const auto exact = BitRange(hn::Ceil(hn::Add(hn::Set(d, low[0][lane]), offset)),
+                                  hn::Floor(hn::Add(hn::Set(d, high[0][lane]), offset)));
+      if (hn::AllTrue(du, hn::Eq(hn::And(near, exact), hn::Zero(du)))) continue;
       kept |= std::uint64_t{1} << lane;
       break;
     }
   }
   return kept;
+}
+
+/// Triangles of a leaf; those without a bounded projection may hide anything.
+HWY_INLINE std::uint64_t TrianglesOverOpenSamples(const SampleRows& rows, const ProjectedLanes& projected,
+                                                  std::uint64_t active, const RowReceiver& r) {
+  const Vec far = hn::Set(Tag(), 1e9f);
+  LaneRectangles q;
+  for (int k = 0; k < 2; ++k) {
+    q.low[k] = hn::IfThenElse(projected.bounded, projected.low[k], hn::Neg(far));
+    q.high[k] = hn::IfThenElse(projected.bounded, projected.high[k], far);
+  }
+  return LanesOverOpenSamples(rows, q, active, r);
+}
+
+/// Boxes from `i` on, of those listed for the cluster.
+HWY_INLINE std::uint64_t BoxesOverOpenSamples(const SampleRows& rows, const float* const low[3],
+                                              const float* const high[3], std::size_t i, const RowReceiver& r) {
+  LaneRectangles q;
+  const std::uint64_t between = Bits(ProjectBoxes(r.shaft, low, high, i, q));
+  const Vec pad = hn::Set(Tag(), ProjectionPad(r.shaft.low[2]) + rows.deviation);
+  for (int k = 0; k < 2; ++k) q.low[k] = hn::Sub(q.low[k], pad), q.high[k] = hn::Add(q.high[k], pad);
+  return LanesOverOpenSamples(rows, q, between, r);
 }
 
 /// The half plane a x + b y + c >= 0, certain beyond `error`, as p - e, p + e, q.
@@ -320,7 +346,7 @@ HWY_INLINE bool RasterizeLeaf(const ExactScene& scene, const BlockerTree::Leaf& 
     std::array<Vec3, 3> corner;
     std::uint64_t active = FacingLanes(leaf, i, r.position, own, pairs, corner);
     if (active == 0) continue;
-    active = LanesOverOpenSamples(*scene.rows, ProjectTriangles(scene.frame, pairs.to_corner, r.shaft), active, r);
+    active = TrianglesOverOpenSamples(*scene.rows, ProjectTriangles(scene.frame, pairs.to_corner, r.shaft), active, r);
     if (active == 0) continue;
     SetEdges(*scene.samples, r.position, corner, pairs);
     RowEdges edges;
@@ -368,7 +394,7 @@ HWY_INLINE void SolveRowReceiver(const ExactScene& scene, std::size_t index, Ker
   const float* const high[3] = {scratch.high[0].data(), scratch.high[1].data(), scratch.high[2].data()};
   bool any = false;
   for (std::size_t i = 0; i < scratch.leaf.size(); i += lanes) {
-    for (std::uint64_t bits = Bits(MeetsShaft(r.shaft, low, high, i)); bits != 0; bits &= bits - 1) {
+    for (std::uint64_t bits = BoxesOverOpenSamples(rows, low, high, i, r); bits != 0; bits &= bits - 1) {
       const BlockerTree::Leaf& leaf =
           scene.tree->leaves[scratch.leaf[i + static_cast<std::size_t>(std::countr_zero(bits))]];
       ++scratch.leaves_tested;

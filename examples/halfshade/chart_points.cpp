@@ -13,10 +13,13 @@
 namespace halfshade {
 namespace {
 
-constexpr const char* kSweeps[] = {
-    "map.resolution=256,512,1024,2048", "map.bias=0,0.5,2,8",           "shadow-accumulation.kernel=4,8,16,32",
-    "afsm-lut:afsm.table=8,32,128,512", "gears.grid=32,64,128,256,512", "pcf.radius=1,2,4,8",
-    "pcss.filter=7,15,31"};
+constexpr const char* kSweeps[] = {"map.resolution=256,512,1024,2048",
+                                   "map.bias=0,0.5,2,8",
+                                   "shadow-accumulation.kernel=4,8,16,32",
+                                   "afsm-lut:afsm.table=8,32,128,512",
+                                   "gears.grid=32,64,128,256,512",
+                                   "pcf.radius=1,2,4,8",
+                                   "pcss.filter=7,15,31"};
 constexpr const char* kQuickSweeps[] = {"map.resolution=256,1024", "shadow-accumulation.kernel=8,16",
                                         "afsm-lut:afsm.table=16,128"};
 constexpr const char* kQuickScenes[] = {"builtin:demo", "builtin:columns", "builtin:fence"};
@@ -142,8 +145,9 @@ void complete_options(ChartOptions& o) {
       if (m.method != ShadowMethod::kOracle) o.methods.push_back(m.name);
     }
   }
-  if (o.samples.empty()) o.samples = o.quick ? std::vector<std::uint32_t>{4, 16, 64, 256}
-                                             : std::vector<std::uint32_t>{4, 16, 64, 256, 1024, 4096};
+  if (o.samples.empty())
+    o.samples =
+        o.quick ? std::vector<std::uint32_t>{4, 16, 64, 256} : std::vector<std::uint32_t>{4, 16, 64, 256, 1024, 4096};
   std::sort(o.samples.begin(), o.samples.end());
   for (const std::uint32_t n : o.samples) {
     if (n < 1 || n > 4096) usage_error(fmt::format("--samples {} is not in 1..4096", n));

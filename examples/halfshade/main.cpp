@@ -41,6 +41,7 @@ int run(int argc, char** argv) {
   int exit_code = halfshade::kOk;
   halfshade::add_render(app, joined(argc, argv), exit_code);
   halfshade::add_accumulate(app, joined(argc, argv));
+  halfshade::add_chart(app, joined(argc, argv));
   halfshade::add_info(app);
   halfshade::add_compare(app, exit_code);
   halfshade::add_verify(app, exit_code);

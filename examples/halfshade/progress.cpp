@@ -35,14 +35,14 @@ Progress::~Progress() {
   if (!quiet_ && terminal_) std::fprintf(stderr, "\r\033[K");
 }
 
-bool Progress::operator()(double done) {
+bool Progress::operator()(double done, const std::string& note) {
   const int tenth = static_cast<int>(done * 10.0);
   if (!quiet_ && terminal_) {
     const int filled = static_cast<int>(done * 30.0);
-    std::fprintf(stderr, "\r%s [%.*s%*s] %3d %%", label_.c_str(), filled, "##############################", 30 - filled,
-                 "", static_cast<int>(done * 100.0));
+    std::fprintf(stderr, "\r\033[K%s [%.*s%*s] %3d %% %s", label_.c_str(), filled, "##############################",
+                 30 - filled, "", static_cast<int>(done * 100.0), note.c_str());
   } else if (!quiet_ && tenth > last_tenth_) {
-    std::fprintf(stderr, "%s: %d %%\n", label_.c_str(), tenth * 10);
+    std::fprintf(stderr, "%s: %d %%%s%s\n", label_.c_str(), tenth * 10, note.empty() ? "" : ", ", note.c_str());
   }
   last_tenth_ = tenth;
   return stop_signal() == 0;

@@ -17,8 +17,8 @@ class Progress {
  public:
   explicit Progress(std::string label, bool quiet);
   ~Progress();
-  /// For ShadowConfig::progress: false once a signal has arrived.
-  bool operator()(double done);
+  /// For ShadowConfig::progress: false once a signal has arrived. `note` is shown behind the bar.
+  bool operator()(double done, const std::string& note = {});
 
  private:
   std::string label_;

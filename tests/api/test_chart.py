@@ -1,0 +1,231 @@
+#!/usr/bin/env python3
+"""halfshade chart and its report: the files' contents, going on after a stop, and the page in a browser if there is one.
+
+Usage: test_chart.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check.
+"""
+
+import base64
+import csv
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PROGRAM = os.path.abspath(sys.argv.pop(1)) if len(sys.argv) > 1 else "halfshade"
+SOURCES = pathlib.Path(__file__).resolve().parents[2]
+OK, USAGE, BAD_INPUT = 0, 2, 3
+SMALL = ("builtin:columns", "--size", "64x64", "--methods", "exact,pcf", "--samples", "4,16", "--sweep",
+         "map.resolution=64,256", "--repeat", 2, "--time-limit", 60, "--quiet")
+COUNT = 2 + 1 + 2  # exact with two numbers of samples; pcf by default and with two resolutions
+
+# Acts on the loaded page like a user and writes what it saw to the body.
+ACTIONS = """<script>
+const seen = {errors: []};
+addEventListener("error", event => seen.errors.push(String(event.message)));
+const pixel = (canvas, u) => [...canvas.getContext("2d").getImageData(canvas.width * u, canvas.height / 4, 1, 1).data];
+const brightness = canvas => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.reduce((a, b) => a + b, 0);
+const act = (canvas, type, u, v, more) => {
+  const box = canvas.getBoundingClientRect();
+  canvas.dispatchEvent(new PointerEvent(type, {clientX: box.left + u * box.width, clientY: box.top + v * box.height, pointerId: 1, bubbles: true, ...more}));
+};
+(async () => {
+  const third = document.getElementById("canvasC");
+  third.setPointerCapture = () => {};
+  await drawSlots();
+  seen.points = document.querySelectorAll(".point").length;
+  seen.canvas = brightness(third);
+  seen.line = document.querySelectorAll("#profile polyline").length;
+  act(third, "pointerdown", 0.5, 0.5); act(third, "pointermove", 0.9, 0.5); act(third, "pointerup", 0.9, 0.5);
+  await drawSlots();
+  seen.wipe = state.wipe;
+  seen.wiped = pixel(third, 0.9);
+  const before = brightness(document.getElementById("canvasA"));
+  third.dispatchEvent(new WheelEvent("wheel", {deltaY: -1, clientX: third.getBoundingClientRect().left + 5, clientY: third.getBoundingClientRect().top + 5}));
+  await drawSlots();
+  seen.zoom = state.zoom;
+  seen.zoomed = brightness(document.getElementById("canvasA")) !== before;
+  document.getElementById("mode").value = "difference";
+  await drawSlots();
+  seen.difference = document.getElementById("shown").textContent;
+  document.querySelector(".point").dispatchEvent(new MouseEvent("mousemove", {bubbles: true}));
+  seen.tip = document.querySelector("#tip img").src.slice(0, 22);
+  document.body.dataset.seen = JSON.stringify(seen);
+})();
+</script>"""
+
+
+def run(*arguments, program=PROGRAM):
+    return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
+
+
+class Chart(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory(prefix="halfshade-chart-")
+        cls.directory = pathlib.Path(cls.scratch.name) / "chart"
+        result = run("chart", *SMALL, "-o", cls.directory)
+        assert result.returncode == OK, result.stderr
+        cls.chart = cls.read()
+        cls.report = cls.directory / "report.html"
+        result = run(SOURCES / "bench/chart_report.py", cls.directory / "chart.json", "-o", cls.report,
+                     program=sys.executable)
+        assert result.returncode == OK, result.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.scratch.cleanup()
+
+    @classmethod
+    def read(cls):
+        return json.loads((cls.directory / "chart.json").read_text(encoding="utf-8"))
+
+    def test_every_point_has_times_errors_and_a_picture(self):
+        self.assertEqual(self.chart["schema"], "halfshade.chart/1")
+        self.assertEqual(len(self.chart["points"]), COUNT)
+        for point in self.chart["points"]:
+            with self.subTest(point=point["id"]):
+                self.assertEqual(point["status"], "measured")
+                self.assertEqual(len(point["times_ms"]), 2)
+                self.assertLessEqual(point["shadow_ms_min"], point["shadow_ms"])
+                self.assertGreater(point["shadow_ms_min"], 0)
+                self.assertGreater(point["against_reference"]["max"], 0)
+                self.assertLessEqual(point["against_reference"]["rmse"], point["against_reference"]["max"])
+                self.assertTrue((self.directory / point["image"]).read_bytes().startswith(b"\x89PNG"))
+        self.assertEqual(len({point["id"] for point in self.chart["points"]}), COUNT)
+
+    def test_the_reference_has_16384_samples_and_the_exact_answer_agrees_with_the_oracle(self):
+        subject, = self.chart["subjects"]
+        self.assertEqual(subject["reference"]["samples"], 16384)
+        self.assertLess(subject["reference"]["own_rmse"], 0.005)
+        self.assertGreater(subject["exact_checked"]["bits"], 0)
+        self.assertEqual(subject["exact_checked"]["wrong_bits"], 0)
+
+    def test_exact_methods_have_no_wrong_bit_and_approximate_ones_err(self):
+        for point in self.chart["points"]:
+            with self.subTest(point=point["id"]):
+                if point["promises_exactness"]:
+                    self.assertEqual(point["against_exact"]["wrong_bits"], 0)
+                    self.assertEqual(point["against_exact"]["max"], 0)
+                else:
+                    self.assertNotIn("wrong_bits", point["against_exact"])
+                    self.assertGreater(point["against_exact"]["rmse"], 0)
+                    self.assertNotEqual(point["assumes"], "")
+
+    def test_more_samples_come_nearer_to_the_reference(self):
+        rmse = {p["id"]: p["against_reference"]["rmse"] for p in self.chart["points"]}
+        self.assertLess(rmse["exact n=16"], rmse["exact n=4"])
+
+    def test_the_table_holds_the_same_numbers(self):
+        with (self.directory / "chart.csv").open(newline="", encoding="utf-8") as file:
+            rows = {row["id"]: row for row in csv.DictReader(file)}
+        self.assertEqual(len(rows), COUNT)
+        for point in self.chart["points"]:
+            self.assertEqual(float(rows[point["id"]]["shadow_ms"]), point["shadow_ms"])
+            self.assertEqual(float(rows[point["id"]]["rmse"]), point["against_reference"]["rmse"])
+
+    def test_a_second_run_computes_nothing_and_changes_no_point(self):
+        written = (self.directory / self.chart["points"][0]["image"]).stat().st_mtime_ns
+        self.assertEqual(run("chart", *SMALL, "-o", self.directory).returncode, OK)
+        again = self.read()
+        self.assertEqual(again["points"], self.chart["points"])
+        self.assertEqual(again["subjects"], self.chart["subjects"])
+        self.assertEqual((self.directory / self.chart["points"][0]["image"]).stat().st_mtime_ns, written)
+
+    def test_a_stopped_run_keeps_its_points_and_the_next_one_goes_on(self):
+        directory = self.directory.parent / "stopped"
+        arguments = ("chart", *SMALL, "--repeat", 1000, "-o", directory)
+        process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + 120
+        while not (directory / "chart.json").exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(timeout=60), 128 + signal.SIGINT)
+        kept = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
+        self.assertGreater(len(kept), 0)
+        self.assertEqual(run("chart", *SMALL, "-o", directory).returncode, OK)
+        after = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
+        self.assertEqual(len(after), COUNT)
+        for old, new in zip(kept, after):
+            self.assertEqual(old["times_ms"], new["times_ms"][:len(old["times_ms"])])
+
+    def test_other_settings_are_refused_and_a_damaged_file_too(self):
+        result = run("chart", *SMALL, "--seed", 1, "-o", self.directory)
+        self.assertEqual(result.returncode, USAGE)
+        self.assertIn("'seed' was 0, is 1", result.stderr)
+        damaged = self.directory.parent / "damaged"
+        damaged.mkdir()
+        (damaged / "chart.json").write_text('{"schema": "halfshade.chart/1", "points"', encoding="utf-8")
+        self.assertEqual(run("chart", *SMALL, "-o", damaged).returncode, BAD_INPUT)
+
+    def test_unknown_methods_options_and_numbers_are_usage_errors(self):
+        for arguments in (("--methods", "magic"), ("--sweep", "map.magic=1"), ("--sweep", "map.resolution"),
+                          ("--sweep", "map.resolution=7"), ("--samples", "5000"), ("--time-limit", "0")):
+            with self.subTest(arguments=arguments):
+                result = run("chart", "builtin:columns", *arguments, "-o", self.directory.parent / "none")
+                self.assertEqual(result.returncode, USAGE, result.stderr)
+                self.assertFalse((self.directory.parent / "none").exists())
+
+    def test_a_run_over_the_time_limit_ends_its_series_with_a_reason(self):
+        directory = self.directory.parent / "limit"
+        self.assertEqual(run("chart", "builtin:columns", "--size", "64x64", "--methods", "exact", "--samples", "4,16,64",
+                             "--sweep", "none", "--time-limit", "1e-6", "--reference-samples", 16, "--quiet", "-o",
+                             directory).returncode, OK)
+        points = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
+        self.assertEqual([point["id"] for point in points], ["exact n=4", "exact n=16", "exact n=64"])
+        for point in points[1:]:
+            self.assertEqual(point["status"], "skipped")
+            self.assertIn("exact n=4 took more than 1e-06 s", point["reason"])
+
+    def test_the_report_needs_no_network_and_holds_data_and_pictures(self):
+        page = self.report.read_text(encoding="utf-8")
+        self.assertNotRegex(page, r"https?://")
+        self.assertNotRegex(page, r'(src|href)="(?!data:|\$\{)')
+        embedded = {name: json.loads(text) for name, text in
+                    re.findall(r'<script type="application/json" id="(\w+)">(.*?)</script>', page, re.S)}
+        self.assertEqual([p["id"] for p in embedded["chart"]["points"]], [p["id"] for p in self.chart["points"]])
+        for point in embedded["chart"]["points"]:
+            uri = embedded["pictures"][point["picture"]]
+            content = base64.b64decode(uri.removeprefix("data:image/png;base64,"))
+            self.assertEqual(content, (self.directory / point["image"]).read_bytes())
+        download = re.search(r'href="data:application/json;base64,([^"]+)"', page).group(1)
+        self.assertEqual(json.loads(base64.b64decode(download)), self.chart)
+        download = re.search(r'href="data:text/csv;base64,([^"]+)"', page).group(1)
+        self.assertEqual(base64.b64decode(download), (self.directory / "chart.csv").read_bytes())
+
+    def test_the_report_works_in_a_browser(self):
+        chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+        if chromium is None:
+            self.skipTest("no chromium on PATH")
+        page = self.report.with_name("acted.html")
+        page.write_text(self.report.read_text(encoding="utf-8").replace("</body>", ACTIONS + "</body>"),
+                        encoding="utf-8")
+        with tempfile.TemporaryDirectory(prefix="halfshade-browser-", ignore_cleanup_errors=True) as profile:
+            result = run("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
+                         "--enable-logging=stderr", "--virtual-time-budget=4000", "--dump-dom", page.as_uri(),
+                         program=chromium)
+        self.assertEqual([line for line in result.stderr.splitlines() if "CONSOLE" in line], [])
+        match = re.search(r'data-seen="([^"]*)"', result.stdout)
+        self.assertIsNotNone(match, "the page's script did not finish")
+        seen = json.loads(match.group(1).replace("&quot;", '"'))
+        self.assertEqual(seen["errors"], [])
+        self.assertEqual(seen["points"], COUNT)
+        self.assertGreater(seen["canvas"], 0)
+        self.assertEqual(seen["line"], 3)
+        self.assertAlmostEqual(seen["wipe"], 0.9, places=2)
+        self.assertEqual(seen["wiped"][:3], [0, 170, 0])
+        self.assertGreater(seen["zoom"], 1)
+        self.assertTrue(seen["zoomed"])
+        self.assertEqual(seen["difference"], "A - B")
+        self.assertEqual(seen["tip"], "data:image/png;base64,")
+
+
+if __name__ == "__main__":
+    unittest.main()
