@@ -60,14 +60,18 @@ struct Work {
   }
 };
 
+/// The paper's pictures, scaled so that the largest, 2560 wide, is as wide as --size asks.
+std::string size_of(const Row& row, const PaperOptions& options) {
+  const std::uint32_t width = options.quick ? 320 : static_cast<std::uint32_t>(std::stoul(options.size));
+  return fmt::format("{}x{}", row.width * width / 2560, row.height * width / 2560);
+}
+
 Work make_work(const Subject& subject, const SceneSource& source, const Row& row, const PaperOptions& options) {
   Work work;
   work.config = paper_config(row.samples);
   View view = source.view;
   scale_light(view.lights[0], row.light_side);
-  const std::uint32_t divisor = options.quick ? 8 : 1;
-  work.scene_case = make_case(subject.name, source.scene, view, 0,
-                              fmt::format("{}x{}", row.width / divisor, row.height / divisor), work.config);
+  work.scene_case = make_case(subject.name, source.scene, view, 0, size_of(row, options), work.config);
   return work;
 }
 
@@ -99,8 +103,8 @@ std::string measure_ratio(Work& work, const PaperOptions& options) {
 
 void print_row(const Subject& subject, const SceneSource& source, std::size_t row, const PaperOptions& options) {
   Work work = make_work(subject, source, kRows[row], options);
-  fmt::print("| {} | {} | {:.1f} | {} |\n", subject.name, kRows[row].label, subject.ratio[row],
-             measure_ratio(work, options));
+  fmt::print("| {} | {} | {} | {:.1f} | {} |\n", subject.name, kRows[row].label, size_of(kRows[row], options),
+             subject.ratio[row], measure_ratio(work, options));
   std::fflush(stdout);
 }
 
@@ -144,7 +148,8 @@ SceneSource load_subject(const Subject& subject, const PaperOptions& options) {
 
 void run_hpc(const PaperOptions& options) {
   fmt::print(
-      "| scene | resolution | paper ratio | our ratio | wrong bits | mask memory |\n|---|---|---|---|---|---|\n");
+      "| scene | paper's row | our picture | paper's ratio | our ratio | wrong bits | mask memory "
+      "|\n|---|---|---|---|---|---|---|\n");
   std::vector<SceneSource> sources;
   for (const Subject& subject : kSubjects) {
     sources.push_back(load_subject(subject, options));
