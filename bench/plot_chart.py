@@ -119,6 +119,7 @@ def main():
     if not subjects:
         parser.error("the chart has no measured points of these scenes")
     matplotlib.rcParams["svg.hashsalt"] = "halfshade"  # equal input, equal bytes
+    matplotlib.rcParams["svg.fonttype"] = "none"  # text stays text
     figure = draw(chart, subjects)
     for ending, metadata in ((".svg", {"Date": None}), (".png", None)):
         path = options.output.with_name(options.output.name + ending)

@@ -73,6 +73,12 @@ ordered_json head_json(const ChartOptions& o) {
           {"settings", settings_json(o)}};
 }
 
+void make_directory(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", path.string(), error.message()));
+}
+
 std::string file_name(const std::string& text) {
   std::string name;
   for (const char c : text) name += std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' ? c : '_';
@@ -101,10 +107,18 @@ class LightChart {
         subject_(pipeline, light, options),
         series_(chart_series(options)) {
     file.expect_inputs(options.scene, light.name, subject_.inputs_hash());
+    const std::string scene = std::filesystem::path(options.scene).stem().string();
+    image_directory_ = "images/" + file_name(scene + "-" + light.name + "-" + subject_.inputs_hash().substr(0, 6));
+    make_directory(std::filesystem::path(options.output) / image_directory_);
+    if (light.shape == LightShape::kPoint) fix_sample_count(series_, 1);
+    if (light.shape == LightShape::kSamples) {
+      fix_sample_count(series_, static_cast<std::uint32_t>(light.points.size()));
+    }
     for (const ChartSeries& series : series_) total_ += series.points.size();
   }
 
   void make() {
+    if (!file_.has_subject(options_.scene, light_.name)) file_.set_subject(describe());
     for (const ChartSeries& series : series_) make_series(series);
     for (std::uint32_t round = 1; round < options_.repeat; ++round) time_again(round);
     if (changed_) file_.set_subject(describe());
@@ -112,13 +126,11 @@ class LightChart {
   }
 
  private:
-  /// Without the points that the light makes equal: point lights always have one sample.
+  /// A series ends with the first point that took too long, now or in an earlier process.
   void make_series(const ChartSeries& series) {
     std::string reason;  // why the rest of the series is left out
     for (const ChartPoint& point : series.points) {
-      if (stop_signal() != 0) throw Error(ErrorCode::kCancelled, "cancelled");
-      progress_.step(static_cast<double>(done_++) / static_cast<double>(total_ * options_.repeat),
-                     fmt::format("{} {}", options_.scene, point.id));
+      begin_run(point);
       ordered_json* known = find(point);
       if (known == nullptr) {
         file_.add_point(reason.empty() ? measure(series, point) : skipped(series, point, reason));
@@ -127,6 +139,12 @@ class LightChart {
       }
       if (reason.empty()) reason = why_to_end(*known, point);
     }
+  }
+
+  void begin_run(const ChartPoint& point) {
+    if (stop_signal() != 0) throw Error(ErrorCode::kCancelled, "cancelled");
+    progress_.step(static_cast<double>(done_++) / static_cast<double>(total_ * options_.repeat),
+                   fmt::format("{} {}", options_.scene, point.id));
   }
 
   ordered_json* find(const ChartPoint& point) { return file_.find_point(options_.scene, light_.name, point.id); }
@@ -178,9 +196,9 @@ class LightChart {
     return json;
   }
 
-  /// Path below the output directory.
+  /// Its path below the output directory.
   std::string write_image(const std::string& id, const VisibilityImage& image) const {
-    const std::string name = "images/" + file_name(fmt::format("{} {} {}", options_.scene, light_.name, id)) + ".png";
+    const std::string name = fmt::format("{}/{}.png", image_directory_, file_name(id));
     const GBuffer& g = pipeline_.gbuffer;
     write_png(std::filesystem::path(options_.output) / name, g.width, g.height, 1, image, false, 8, {});
     return name;
@@ -192,16 +210,22 @@ class LightChart {
     return json;
   }
 
+  bool has_enough(const ordered_json& point, std::uint32_t runs) const {
+    if (point.at("status") != "measured") return true;
+    double sum_ms = 0.0;
+    for (const ordered_json& ms : point.at("times_ms")) sum_ms += ms.get<double>();
+    return point.at("times_ms").size() >= runs || sum_ms > 1000.0 * options_.time_limit;
+  }
+
   /// One run of every point that has fewer than `round` + 1 times; those of an earlier process count.
   void time_again(std::uint32_t round) {
     Stopwatch since_save;
     double unsaved_ms = 0.0;
     for (const ChartSeries& series : series_) {
       for (const ChartPoint& point : series.points) {
-        progress_.step(static_cast<double>(done_++) / static_cast<double>(total_ * options_.repeat),
-                       fmt::format("{} {} again", options_.scene, point.id));
+        begin_run(point);
         ordered_json& json = *find(point);
-        if (json.at("status") != "measured" || json.at("times_ms").size() > round) continue;
+        if (has_enough(json, round + 1)) continue;
         const ChartSubject::Run run = subject_.run(point.config);
         if (run.reason.empty()) add_time(json, run.ms);
         if ((unsaved_ms += since_save.lap()) < kSaveEveryMs) continue;
@@ -218,6 +242,7 @@ class LightChart {
   ChartProgress& progress_;
   ChartSubject subject_;
   std::vector<ChartSeries> series_;
+  std::string image_directory_;  // below the output directory
   std::size_t total_ = 0, done_ = 0;
   bool changed_ = false;  // a point was measured in this process
 };
@@ -227,6 +252,7 @@ void run(ChartOptions options) {
   if (!(options.time_limit > 0.0)) usage_error(fmt::format("--time-limit {} is not positive", options.time_limit));
   chart_series(options);  // names are checked before anything is loaded
   if (!options.simd.empty()) force_simd_target(options.simd);
+  make_directory(options.output);
   ChartFile file(options.output, head_json(options), options.fresh);
   ChartProgress progress(options.scenes.size(), options.quiet);
   for (std::size_t s = 0; s < options.scenes.size(); ++s) {
@@ -253,9 +279,12 @@ void add_chart(CLI::App& app, const std::string& command_line) {
   o->size.clear();
   verb->add_option("scenes", o->scenes, "OBJ files or builtin:NAME[:SIZE] (default: all built-in scenes)");
   verb->add_option("--shared-scenes", o->shared_scenes, "Also all OBJ files below this directory");
-  verb->add_option("--methods", o->methods, "Methods, separated by commas (default: all but oracle)")->delimiter(',');
+  verb->add_option("--methods", o->methods, "Methods, separated by commas (default: all but oracle)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   verb->add_option("--samples", o->samples, "Light samples of methods with masks (default: 4,16,64,256,1024,4096)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   verb->add_option("--base-samples", o->base_samples, "Light samples where another parameter is swept (default: 256)")
       ->check(CLI::Range(1, 4096));
   verb->add_option("--sweep", o->sweeps,
@@ -265,7 +294,8 @@ void add_chart(CLI::App& app, const std::string& command_line) {
   verb->add_option("-o,--output", o->output, "Directory for chart.json, chart.csv and images; finished points are kept")
       ->capture_default_str();
   verb->add_option("--size", o->size, "Picture in pixels, WIDTHxHEIGHT (default: 256x256)");
-  verb->add_option("--repeat", o->repeat, "Runs of each point; the time is their median")
+  verb->add_option("--repeat", o->repeat,
+                   "Runs of each point, fewer if they take longer than the limit together; their median counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   verb->add_option("--time-limit", o->time_limit, "Seconds; a run that takes longer ends its series of parameters")

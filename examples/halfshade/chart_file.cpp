@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
@@ -79,7 +80,7 @@ ordered_json read(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::stringstream text;
   text << stream.rdbuf();
-  const ordered_json json = ordered_json::parse(text.str(), nullptr, false);
+  ordered_json json = ordered_json::parse(text.str(), nullptr, false);
   if (!json.is_object() || json.value("schema", "") != kSchema || !json.contains("settings") ||
       !json.contains("subjects") || !json.contains("points")) {
     throw Error(ErrorCode::kBadInput, fmt::format("{}: not a chart ({}); --fresh replaces it", path.string(), kSchema));
@@ -91,9 +92,6 @@ ordered_json read(const std::filesystem::path& path) {
 
 ChartFile::ChartFile(const std::filesystem::path& directory, const ordered_json& head, bool fresh)
     : directory_(directory) {
-  std::error_code error;
-  std::filesystem::create_directories(directory / "images", error);
-  if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", directory.string(), error.message()));
   content_ = {{"schema", kSchema}};
   content_.update(head);
   content_["subjects"] = ordered_json::array();
@@ -127,6 +125,12 @@ void ChartFile::expect_inputs(const std::string& scene, const std::string& light
   };
   drop(subjects, is_stale);
   drop(content_["points"], [&](const ordered_json& point) { return is_of(point, scene, light); });
+}
+
+bool ChartFile::has_subject(const std::string& scene, const std::string& light) const {
+  const ordered_json& subjects = content_["subjects"];
+  return std::any_of(subjects.begin(), subjects.end(),
+                     [&](const ordered_json& subject) { return is_of(subject, scene, light); });
 }
 
 void ChartFile::set_subject(const ordered_json& subject) {

@@ -11,11 +11,12 @@ class ChartFile {
  public:
   /// Reads `directory`/chart.json if it is there and not `fresh`. `head` holds what is written before subjects and
   /// points; its "settings" must be those of the file. Throws Error{kUsage} if they are not, Error{kBadInput} for a
-  /// damaged file, Error{kOutput}.
+  /// damaged file.
   ChartFile(const std::filesystem::path& directory, const nlohmann::ordered_json& head, bool fresh);
 
   /// Drops the points of a scene and light whose inputs are others than those of the file.
   void expect_inputs(const std::string& scene, const std::string& light, const std::string& inputs);
+  bool has_subject(const std::string& scene, const std::string& light) const;
   /// Replaces the description of (scene, light).
   void set_subject(const nlohmann::ordered_json& subject);
   /// The point of that id, or null; valid until the next add_point.

@@ -177,4 +177,15 @@ std::vector<ChartSeries> chart_series(const ChartOptions& options) {
   return series;
 }
 
+void fix_sample_count(std::vector<ChartSeries>& series, std::uint32_t count) {
+  for (ChartSeries& s : series) {
+    for (ChartPoint& point : s.points) {
+      point.config.light_sample_count = count;
+      point.id = id_of(point.config);
+      if (s.parameter == "light_samples" && yields_masks(point.config)) point.label = fmt::format("{}", count);
+    }
+    if (s.parameter == "light_samples") s.points.resize(1);
+  }
+}
+
 }  // namespace halfshade

@@ -37,4 +37,7 @@ void complete_options(ChartOptions& options);
 /// method that it concerns. Throws Error{kUsage} for unknown names and values out of range.
 std::vector<ChartSeries> chart_series(const ChartOptions& options);
 
+/// For lights that always have `count` samples: points that this makes equal remain once.
+void fix_sample_count(std::vector<ChartSeries>& series, std::uint32_t count);
+
 }  // namespace halfshade

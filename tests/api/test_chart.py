@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""halfshade chart and its report: the files' contents, going on after a stop, and the page in a browser if there is one.
+"""halfshade chart, its plots and its report: contents, going on after a stop, the page in a browser if there is one.
 
 Usage: test_chart.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check.
 """
@@ -17,20 +17,29 @@ import sys
 import tempfile
 import time
 import unittest
+import xml.etree.ElementTree
 
 PROGRAM = os.path.abspath(sys.argv.pop(1)) if len(sys.argv) > 1 else "halfshade"
 SOURCES = pathlib.Path(__file__).resolve().parents[2]
 OK, USAGE, BAD_INPUT = 0, 2, 3
-SMALL = ("builtin:columns", "--size", "64x64", "--methods", "exact,pcf", "--samples", "4,16", "--sweep",
-         "map.resolution=64,256", "--repeat", 2, "--time-limit", 60, "--quiet")
+POINTS = ("builtin:columns", "--size", "64x64", "--methods", "exact,pcf", "--samples", "4,16", "--sweep",
+          "map.resolution=64,256", "--time-limit", 60, "--quiet")
+SMALL = (*POINTS, "--repeat", 2)
 COUNT = 2 + 1 + 2  # exact with two numbers of samples; pcf by default and with two resolutions
 
 # Acts on the loaded page like a user and writes what it saw to the body.
 ACTIONS = """<script>
 const seen = {errors: []};
 addEventListener("error", event => seen.errors.push(String(event.message)));
-const pixel = (canvas, u) => [...canvas.getContext("2d").getImageData(canvas.width * u, canvas.height / 4, 1, 1).data];
-const brightness = canvas => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.reduce((a, b) => a + b, 0);
+const read = canvas => {  // from a copy, so that the page's own canvases stay as they are
+  const copy = document.createElement("canvas");
+  copy.width = canvas.width; copy.height = canvas.height;
+  const context = copy.getContext("2d", {willReadFrequently: true});
+  context.drawImage(canvas, 0, 0);
+  return context;
+};
+const pixel = (canvas, u) => [...read(canvas).getImageData(canvas.width * u, canvas.height / 4, 1, 1).data];
+const brightness = canvas => read(canvas).getImageData(0, 0, canvas.width, canvas.height).data.reduce((a, b) => a + b, 0);
 const act = (canvas, type, u, v, more) => {
   const box = canvas.getBoundingClientRect();
   canvas.dispatchEvent(new PointerEvent(type, {clientX: box.left + u * box.width, clientY: box.top + v * box.height, pointerId: 1, bubbles: true, ...more}));
@@ -54,6 +63,11 @@ const act = (canvas, type, u, v, more) => {
   document.getElementById("mode").value = "difference";
   await drawSlots();
   seen.difference = document.getElementById("shown").textContent;
+  document.getElementById("mode").value = "flicker";
+  state.flicker = false; await drawSlots();
+  const shownA = brightness(third);
+  state.flicker = true; await drawSlots();
+  seen.flickers = shownA === brightness(document.getElementById("canvasA")) && shownA !== brightness(third);
   document.querySelector(".point").dispatchEvent(new MouseEvent("mousemove", {bubbles: true}));
   seen.tip = document.querySelector("#tip img").src.slice(0, 22);
   document.body.dataset.seen = JSON.stringify(seen);
@@ -140,7 +154,7 @@ class Chart(unittest.TestCase):
 
     def test_a_stopped_run_keeps_its_points_and_the_next_one_goes_on(self):
         directory = self.directory.parent / "stopped"
-        arguments = ("chart", *SMALL, "--repeat", 1000, "-o", directory)
+        arguments = ("chart", *POINTS, "--repeat", 1000, "-o", directory)
         process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.DEVNULL,
                                    stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 120
@@ -151,7 +165,9 @@ class Chart(unittest.TestCase):
         kept = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
         self.assertGreater(len(kept), 0)
         self.assertEqual(run("chart", *SMALL, "-o", directory).returncode, OK)
-        after = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
+        resumed = json.loads((directory / "chart.json").read_text(encoding="utf-8"))
+        self.assertEqual(len(resumed["subjects"]), 1)
+        after = resumed["points"]
         self.assertEqual(len(after), COUNT)
         for old, new in zip(kept, after):
             self.assertEqual(old["times_ms"], new["times_ms"][:len(old["times_ms"])])
@@ -175,14 +191,42 @@ class Chart(unittest.TestCase):
 
     def test_a_run_over_the_time_limit_ends_its_series_with_a_reason(self):
         directory = self.directory.parent / "limit"
-        self.assertEqual(run("chart", "builtin:columns", "--size", "64x64", "--methods", "exact", "--samples", "4,16,64",
-                             "--sweep", "none", "--time-limit", "1e-6", "--reference-samples", 16, "--quiet", "-o",
-                             directory).returncode, OK)
+        result = run("chart", "builtin:columns", "--size", "64x64", "--methods", "exact", "--samples", "4,16,64", "--sweep",
+                     "none", "--time-limit", "1e-6", "--reference-samples", 16, "--quiet", "-o", directory)
+        self.assertEqual(result.returncode, OK, result.stderr)
         points = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
         self.assertEqual([point["id"] for point in points], ["exact n=4", "exact n=16", "exact n=64"])
         for point in points[1:]:
             self.assertEqual(point["status"], "skipped")
             self.assertIn("exact n=4 took more than 1e-06 s", point["reason"])
+
+    def test_points_that_a_point_light_makes_equal_are_measured_once(self):
+        scene = self.directory.parent / "point.obj"
+        scene.write_text("v -4 0 -4\nv -4 0 4\nv 4 0 4\nv -1 1 -1\nv -1 1 1\nv 1 1 1\nf 1 2 3\nf 4 5 6\n",
+                         encoding="utf-8")
+        scene.with_suffix(".view.json").write_text(json.dumps({
+            "camera": {"eye": [0, 4, 9], "target": [0, 1, 0], "up": [0, 1, 0], "fov_y_deg": 40},
+            "lights": [{"name": "lamp", "type": "point", "position": [2, 6, 1]}]}), encoding="utf-8")
+        directory = self.directory.parent / "point"
+        result = run("chart", "--methods", "exact,pcf", "--samples", "4,16", scene, "--size", "48x48", "--sweep",
+                     "pcf:map.resolution=64", "--quiet", "-o", directory)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        points = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
+        self.assertEqual([point["id"] for point in points], ["exact n=1", "pcf n=1", "pcf n=1 map.resolution=64"])
+
+    def test_the_plots_name_every_method_and_point(self):
+        if subprocess.run([sys.executable, "-c", "import matplotlib"], capture_output=True, check=False).returncode != 0:
+            self.skipTest("no matplotlib")
+        result = run(SOURCES / "bench/plot_chart.py", self.directory / "chart.json", "-o", self.directory / "plot",
+                     program=sys.executable)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertTrue((self.directory / "plot.png").read_bytes().startswith(b"\x89PNG"))
+        drawing = xml.etree.ElementTree.parse(self.directory / "plot.svg")
+        texts = ["".join(element.itertext()).strip() for element in drawing.iter() if element.tag.endswith("}text")]
+        for text in ("columns", "exact", "pcf", "exact 16"):
+            self.assertIn(text, texts)
+        for label in ("default", "resolution 64", "resolution 256"):
+            self.assertTrue(any(text.endswith(label) for text in texts), label)
 
     def test_the_report_needs_no_network_and_holds_data_and_pictures(self):
         page = self.report.read_text(encoding="utf-8")
@@ -224,6 +268,7 @@ class Chart(unittest.TestCase):
         self.assertGreater(seen["zoom"], 1)
         self.assertTrue(seen["zoomed"])
         self.assertEqual(seen["difference"], "A - B")
+        self.assertTrue(seen["flickers"])
         self.assertEqual(seen["tip"], "data:image/png;base64,")
 
 
