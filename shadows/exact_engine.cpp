@@ -23,9 +23,8 @@ constexpr double kGrazing = 1e-5;
 
 /// Receivers in front of the light on its z > 0 side, in Morton order of their positions, so that runs are compact.
 std::vector<std::uint32_t> order_receivers(const ReceiverArray& receivers, const LightFrame& frame) {
-  return morton_order(receivers.position, [&](std::uint32_t i) {
-    return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing;
-  });
+  return morton_order(receivers.position,
+                      [&](std::uint32_t i) { return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing; });
 }
 
 /// Bins over the bounding rectangle of all sets.

@@ -60,10 +60,14 @@ void set_stsv_filter(ShadowConfig& c, const std::string& value) {
 constexpr MethodOption kOptions[] = {
     {"stsv.opaque", "opaque triangles by the exact engine, or through volumes too: exact, volumes (equal masks)",
      set_stsv_opaque,
-     [](const ShadowConfig& c) { return std::string(c.stsv.opaque == OpaqueBlockers::kVolumes ? "volumes" : "exact"); }},
+     [](const ShadowConfig& c) {
+       return std::string(c.stsv.opaque == OpaqueBlockers::kVolumes ? "volumes" : "exact");
+     }},
     {"stsv.filter", "opacity at the texel, or averaged over a sample's footprint (no masks): nearest, filtered",
      set_stsv_filter,
-     [](const ShadowConfig& c) { return std::string(c.stsv.filter == OpacityFilter::kFiltered ? "filtered" : "nearest"); }},
+     [](const ShadowConfig& c) {
+       return std::string(c.stsv.filter == OpacityFilter::kFiltered ? "filtered" : "nearest");
+     }},
     {"afsm.grid", "cells per axis of the light view, 16..2048; 0 = from the number of receivers",
      HALFSHADE_NUMBER(grid_resolution, 0, 2048)},
     {"afsm.back-faces", "skip front faces of certified closed meshes: on, off (exact too)",
@@ -108,7 +112,8 @@ constexpr MethodOption kOptions[] = {
      HALFSHADE_SWITCH(gears.refine)},
     {"gears.subdivide", "cells with many receivers get a grid of their own: on, off",
      HALFSHADE_SWITCH(gears.subdivide)},
-    {"gears.bounds", "cells shrink to the box and depth of their receivers, volumes to that depth: on, off", HALFSHADE_SWITCH(gears.bounds)},
+    {"gears.bounds", "cells shrink to the box and depth of their receivers, volumes to that depth: on, off",
+     HALFSHADE_SWITCH(gears.bounds)},
     {"gears.coarse", "one pair for 8x8 cells that a region covers: on, off", HALFSHADE_SWITCH(gears.coarse)},
     {"gears.camera", "distance of the camera behind the light in diagonals of the light, 0..16",
      HALFSHADE_NUMBER(gears.camera, 0, 16)},

@@ -20,7 +20,7 @@ struct SampleRows {
   std::vector<float> y, offset;                  // [set][padded]
   std::vector<float> point_x, point_y, point_z;  // [set][KernelSamples::padded] the samples themselves, lattice; with
                                                  // room for 16 more to be read
-  std::vector<std::uint32_t> valid;  // [padded]: bits of real samples
+  std::vector<std::uint32_t> valid;              // [padded]: bits of real samples
 
   bool empty() const { return rows == 0; }
 };

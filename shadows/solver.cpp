@@ -62,14 +62,14 @@ const MethodTraits& traits_of(ShadowMethod method) { return kMethods[static_cast
 ShadowMethod shadow_method_from_name(const std::string& name) { return entry_of(kMethods, name, "method").method; }
 SamplePattern sample_pattern_from_name(const std::string& name) { return entry_of(kPatterns, name, "pattern").value; }
 bool yields_masks(const ShadowConfig& config) {
-  const bool filtered = config.method == ShadowMethod::kSoftTexturedShadowVolumes &&
-                        config.stsv.filter == OpacityFilter::kFiltered;
+  const bool filtered =
+      config.method == ShadowMethod::kSoftTexturedShadowVolumes && config.stsv.filter == OpacityFilter::kFiltered;
   return traits_of(config.method).masks && !filtered;
 }
 
 bool promises_exactness(const ShadowConfig& config) {
-  const bool filtered = config.method == ShadowMethod::kSoftTexturedShadowVolumes &&
-                        config.stsv.filter == OpacityFilter::kFiltered;
+  const bool filtered =
+      config.method == ShadowMethod::kSoftTexturedShadowVolumes && config.stsv.filter == OpacityFilter::kFiltered;
   return traits_of(config.method).exact && !filtered;
 }
 

@@ -6,9 +6,9 @@
 
 namespace halfshade {
 
-/// Masks of `receivers` under one light; fills the counters. Exact methods give equal masks. Translucent triangles block
-/// nothing, here and below; stats.details has their number (transmittance.h). Throws Error{kUsage} for
-/// methods without masks.
+/// Masks of `receivers` under one light; fills the counters. Exact methods give equal masks. Translucent triangles
+/// block nothing, here and below; stats.details has their number (transmittance.h). Throws Error{kUsage} for methods
+/// without masks.
 void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats);
 

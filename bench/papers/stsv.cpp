@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include "bench/bench_case.h"
-#include "examples/halfshade/scene_source.h"
 #include "bench/harness.h"
+#include "examples/halfshade/scene_source.h"
 #include "papers.h"
 #include "shadows/solver.h"
 

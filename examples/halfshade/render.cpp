@@ -13,11 +13,11 @@
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/shading.h"
+#include "render_stream.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
 #include "shadows/transmittance.h"
-#include "render_stream.h"
 #include "stats_json.h"
 
 namespace halfshade {

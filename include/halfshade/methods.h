@@ -80,7 +80,7 @@ enum class GearsRegion {
 struct GearsOptions {
   std::uint32_t grid = 0;  // cells per axis, 8..1024; 0 = from the number of receivers
   GearsRegion region = GearsRegion::kBox;
-  bool refine = false;    // keep a (blocker, cell) pair only if a receiver of the cell is in the 3-D frustum (figure 11)
+  bool refine = false;  // keep a (blocker, cell) pair only if a receiver of the cell is in the 3-D frustum (figure 11)
   bool subdivide = true;  // cells with many receivers get a grid of their own
   bool bounds = true;     // cells shrink to the box and depth of their receivers, and shadow volumes to that depth
   bool coarse = true;     // regions that cover 8x8 cells, or a whole subdivided one, are noted once for all of them
@@ -119,14 +119,14 @@ struct ShadowMapOptions {
   /// A lexel hides a receiver where its depth is smaller than the receiver's by more than `bias` lexel widths, and its
   /// point lies above the receiver's tangent plane by more than `slope_bias` lexel widths; 0..64 each.
   float bias = 0.5f, slope_bias = 0.5f;
-  std::uint32_t pcf_radius = 2;                 // pcf: (2 radius + 1)^2 lexels are compared, 0..64
-  std::uint32_t pcss_search = 9;                // pcss: lookups per axis of the blocker search, 1..64
-  std::uint32_t pcss_filter = 15;               // pcss: lookups per axis of the filter, 1..64
-  std::uint32_t kernel = 10;                    // shadow-accumulation: lookups per axis (the paper's K), 1..64
+  std::uint32_t pcf_radius = 2;    // pcf: (2 radius + 1)^2 lexels are compared, 0..64
+  std::uint32_t pcss_search = 9;   // pcss: lookups per axis of the blocker search, 1..64
+  std::uint32_t pcss_filter = 15;  // pcss: lookups per axis of the filter, 1..64
+  std::uint32_t kernel = 10;       // shadow-accumulation: lookups per axis (the paper's K), 1..64
   AccumulationForm form = AccumulationForm::kBits;
   std::uint32_t layers = 1;  // shadow-accumulation: depth layers peeled at most, 1..64
-  bool refine = true;        // shadow-accumulation: a second kernel, no larger than the casters that the first one saw need
-  float plane = 0.0f;        // shadow-accumulation: the map plane's distance in light radii, 1..1e6; 0 = nearest caster
+  bool refine = true;  // shadow-accumulation: a second kernel, no larger than the casters that the first one saw need
+  float plane = 0.0f;  // shadow-accumulation: the map plane's distance in light radii, 1..1e6; 0 = nearest caster
 };
 
 /// raytrace.

@@ -190,8 +190,7 @@ Scene load_obj(const fs::path& file, const ObjLoadOptions& options, ObjLoadRepor
   return ObjLoader(file, options, report).run(std::move(geometry));
 }
 
-Scene load_obj_materials(const fs::path& file, const ObjLoadOptions& options, ObjGeometry used,
-                         ObjLoadReport& report) {
+Scene load_obj_materials(const fs::path& file, const ObjLoadOptions& options, ObjGeometry used, ObjLoadReport& report) {
   const FpEnvironment environment;
   fill_report(used, report);
   return ObjLoader(file, options, report).run(std::move(used));

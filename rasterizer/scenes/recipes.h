@@ -19,8 +19,8 @@ void make_grass(std::uint32_t size, BuiltinScene& out);  // strands.cpp
 void make_hairball(std::uint32_t size, BuiltinScene& out);
 void make_glass(std::uint32_t size, BuiltinScene& out);  // glass.cpp
 
-/// `grass` in pieces: everything but the blades, then blades [first, first + count) of `size`, appended to `scene`, five
-/// triangles each.
+/// `grass` in pieces: everything but the blades, then blades [first, first + count) of `size`, appended to `scene`,
+/// five triangles each.
 inline constexpr std::uint32_t kBladeTriangles = 5;
 void make_lawn(BuiltinScene& out);
 void add_blades(std::uint32_t first, std::uint32_t count, std::uint32_t size, Scene& scene);

@@ -85,8 +85,7 @@ inline std::uint64_t wrong_bits(const VisibilityMasks& a, const VisibilityMasks&
 /// Methods whose masks must equal the oracle's in every bit.
 inline const std::vector<ShadowMethod>& exact_methods() {
   static const std::vector<ShadowMethod> methods = {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kExact,
-                                                    ShadowMethod::kHierarchicalPenumbraCasting,
-                                                    ShadowMethod::kGears,
+                                                    ShadowMethod::kHierarchicalPenumbraCasting, ShadowMethod::kGears,
                                                     ShadowMethod::kSoftTexturedShadowVolumes};
   return methods;
 }
