@@ -12,7 +12,7 @@ struct ChartOptions : PipelineOptions {
   std::vector<std::string> scenes, methods, sweeps;
   std::vector<std::uint32_t> samples;
   std::string shared_scenes, output = "out/chart";
-  double time_limit = 2.0;         // seconds for one run
+  double time_limit = 1.0;         // seconds for one run; a point whose runs took longer together has enough of them
   std::uint32_t base_samples = 0;  // where another parameter is swept; 0 = 256, or the nearest of `samples`
   std::uint32_t repeat = 3, reference_samples = 16384;
   bool quick = false, fresh = false;

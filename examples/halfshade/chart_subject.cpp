@@ -109,12 +109,14 @@ const VisibilityImage& ChartSubject::reference() {
   return reference_;
 }
 
-/// The mean of many sets, kept as two halves whose difference tells how far it may be trusted. A pixel that is no
-/// receiver of some set sees nothing of that set.
+/// The mean of many sets, kept as two halves whose difference tells how far it may be trusted. Only pixels that are
+/// receivers of every set are compared: where the tangent plane cuts off all but a sliver of the light, a set that
+/// misses the sliver says 0 and one that meets it counts the samples below the plane as well, so that V there is no
+/// mean of anything.
 void ChartSubject::make_reference() {
   ShadowConfig config = shadow_config(options_);
   config.method = ShadowMethod::kExact;
-  config.pattern = SamplePattern::kRows;  // of all patterns, its sets converge fastest
+  config.pattern = SamplePattern::kStratified;  // independent sets: no error that all of them share
   config.light_sample_count = std::min(options_.reference_samples, kReferenceSetSize);
   config.sample_sets = 1;
   config.progress = [](double) { return stop_signal() == 0; };
@@ -122,7 +124,7 @@ void ChartSubject::make_reference() {
   const std::size_t pixels = pipeline_.gbuffer.size();
   std::array<std::vector<double>, 2> halves = {std::vector<double>(pixels, 0.0), std::vector<double>(pixels, 0.0)};
   std::array<std::uint32_t, 2> sets_of_half = {0, 0};
-  std::vector<std::uint8_t> seen(pixels, 0);
+  std::vector<std::uint32_t> seen(pixels, 0);  // sets that the pixel is a receiver of
   VisibilityMasks masks;
   ShadowStats stats;
   for (std::uint32_t set = 0; set < sets; ++set) {
@@ -134,14 +136,14 @@ void ChartSubject::make_reference() {
     reference_samples_ += samples.count;
     for (std::size_t i = 0; i < receivers.size(); ++i) {
       halves[set % 2][receivers.sample[i]] += masks.visibility(i);
-      seen[receivers.sample[i]] = 1;
+      ++seen[receivers.sample[i]];
     }
   }
   Differences between;
   reference_.assign(pixels, 0.0f);
   for (std::uint32_t i = 0; i < pixels; ++i) {
     reference_[i] = static_cast<float>((halves[0][i] + halves[1][i]) / sets);
-    if (seen[i] == 0) continue;
+    if (seen[i] < sets) continue;
     compared_.push_back(i);
     if (sets > 1) between.add(halves[0][i] / sets_of_half[0] - halves[1][i] / sets_of_half[1], 0.0);
   }

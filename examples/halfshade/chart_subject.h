@@ -55,7 +55,7 @@ class ChartSubject {
   std::string inputs_hash_;
   std::map<std::uint32_t, Question> questions_;  // by number of light samples
   VisibilityImage reference_;
-  std::vector<std::uint32_t> compared_;  // pixels that are receivers of any set of the reference
+  std::vector<std::uint32_t> compared_;  // pixels that are receivers of every set of the reference
   std::uint32_t reference_samples_ = 0;
   double reference_error_ = 0.0;  // its own: half the RMSE between its two halves
   std::uint64_t checked_bits_ = 0, checked_wrong_ = 0;
