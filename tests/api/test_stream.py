@@ -53,7 +53,8 @@ class Stream(unittest.TestCase):
 
     def test_a_built_in_scene_made_in_pieces_gives_the_same_masks_and_picture(self):
         streamed = self.check_equal("builtin:grass:400", "--piece", 333)
-        self.assertLess(streamed["peak_rss_bytes"], streamed["forecast_bytes"])
+        if "HALFSHADE_SANITIZED" not in os.environ:  # sanitizers keep freed memory
+            self.assertLess(streamed["peak_rss_bytes"], streamed["forecast_bytes"])
 
     def test_a_scene_with_alpha_maps_gives_the_same_masks_and_picture(self):
         self.check_equal("builtin:demo:8", "--piece", 1000)
