@@ -262,17 +262,17 @@ HWY_INLINE std::uint64_t OpenGroups(const std::uint64_t* valid, const std::uint6
   return open;
 }
 
-/// Tests every still open sample of one receiver; true where bits were added. `active`, if given, has a bit for every
-/// group of samples that the blocker can matter to; the others are left alone.
-HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples, const ScaledPlanes& planes,
-                            std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters,
-                            const std::uint64_t* active = nullptr) {
+/// visit(word, shift, first, inside, doubtful) for the groups of open samples of one receiver that the planes do not
+/// rule out: samples first.. of KernelSamples::points, bits shift.. of the mask word; of those still open, the ones
+/// certainly inside the planes and the ones that the filter leaves open. `active`, if given, has a bit for every group
+/// that matters; the others are left alone.
+template <class Visit>
+HWY_INLINE void ForEachPossibleGroup(const KernelSamples& samples, const ScaledPlanes& planes, std::size_t receiver,
+                                     const KernelReceivers& receivers, const std::uint64_t* mask,
+                                     const std::uint64_t* active, KernelCounters& counters, const Visit& visit) {
   constexpr std::uint32_t kGroup = KernelSamples::kGroup;
   const std::size_t set = receivers.set[receiver], offset = set * samples.padded,
                     groups_at = set * samples.group_stride;
-  const vec3 r(receivers.x[receiver], receivers.y[receiver], receivers.z[receiver]);
-  std::uint64_t* mask = receivers.mask(receiver);
-  bool added = false;
   for (std::size_t word = 0; word < receivers.words; word += 16) {
     std::uint64_t open =
         OpenGroups(samples.valid.data(), mask, word, std::min<std::size_t>(16, receivers.words - word));
@@ -280,25 +280,37 @@ HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples
     const GroupBits groups = TestGroups(planes, samples, groups_at + 4 * word, open);
     for (std::uint64_t rest = groups.possible; rest != 0; rest &= rest - 1) {
       const std::size_t g = 4 * word + static_cast<std::size_t>(std::countr_zero(rest)), first = g * kGroup;
-      const std::size_t w = first / 64, shift = first % 64;
+      const std::size_t w = first / 64, shift = first % 64, at = offset + first;
       const std::uint64_t wanted = ((samples.valid[w] & ~mask[w]) >> shift) & 0xffff;
       std::uint64_t inside = wanted, possible = wanted;
       if (((groups.inside >> (g - 4 * word)) & 1) == 0) {
-        const std::size_t at = offset + first;
         TestGroup(planes, &samples.x[at], &samples.y[at], &samples.z[at], inside, possible);
         counters.sample_tests += kGroup;
         inside &= wanted;
         possible &= wanted;
       }
-      const std::uint64_t doubtful = possible & ~inside;
-      if (doubtful != 0 || blocker.perforated) {
-        inside =
-            settle_samples(blocker, r, {samples.points.data() + offset + first, kGroup}, inside, doubtful, counters);
-      }
-      mask[w] |= inside << shift;
-      added = added || inside != 0;
+      visit(w, shift, at, inside, possible & ~inside);
     }
   }
+}
+
+/// Tests every still open sample of one receiver; true where bits were added. `active` as above.
+HWY_INLINE bool TestSamples(const Blocker& blocker, const KernelSamples& samples, const ScaledPlanes& planes,
+                            std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters,
+                            const std::uint64_t* active = nullptr) {
+  const vec3 r(receivers.x[receiver], receivers.y[receiver], receivers.z[receiver]);
+  std::uint64_t* mask = receivers.mask(receiver);
+  bool added = false;
+  ForEachPossibleGroup(samples, planes, receiver, receivers, mask, active, counters,
+                       [&](std::size_t word, std::size_t shift, std::size_t first, std::uint64_t inside,
+                           std::uint64_t doubtful) HWY_ATTR {
+                         if (doubtful != 0 || blocker.perforated) {
+                           inside = settle_samples(blocker, r, {samples.points.data() + first, KernelSamples::kGroup},
+                                                   inside, doubtful, counters);
+                         }
+                         mask[word] |= inside << shift;
+                         added = added || inside != 0;
+                       });
   if (added && std::equal(samples.valid.begin(), samples.valid.end(), mask)) receivers.open[receiver] = 0;
   return added;
 }

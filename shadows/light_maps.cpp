@@ -173,6 +173,26 @@ void make_light_maps(const LatticeMesh& mesh, const ReceiverArray& receivers, co
   }
 }
 
+void make_center_maps(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
+                      std::uint32_t border, const ShadowMapOptions& options, LightMaps& maps, ShadowStats& stats) {
+  const std::vector<std::uint32_t> all = all_receivers(receivers);
+  make_light_maps(mesh, receivers,
+                  {.eye = samples.center,
+                   .axes = make_map_axes(samples, receivers),
+                   .border = border,
+                   .resolution = options.resolution,
+                   .receivers = all},
+                  maps);
+  note_maps(maps, stats);
+}
+
+std::optional<MapReceiver> place_in_maps(const LightMaps& maps, const ReceiverArray& receivers, std::size_t i,
+                                         const ShadowMapOptions& options) {
+  const DepthMap* map = maps.map_of(dvec3(receivers.position[i]));
+  if (map == nullptr) return std::nullopt;
+  return place_in_map(*map, receivers.position[i], receivers.normal[i], options);
+}
+
 std::vector<std::uint32_t> all_receivers(const ReceiverArray& receivers) {
   std::vector<std::uint32_t> all(receivers.size());
   for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "rasterizer/core/parallel.h"
 #include "shadows/shadow_map.h"
@@ -48,6 +49,14 @@ struct MapRequest {
 /// Fits and draws. `maps` may hold earlier ones, whose memory is used again.
 void make_light_maps(const LatticeMesh& mesh, const ReceiverArray& receivers, const MapRequest& request,
                      LightMaps& maps);
+
+/// The maps of one point light at the light's centre, for lookups up to `border` lexels around each receiver; noted.
+void make_center_maps(const LatticeMesh& mesh, const ReceiverArray& receivers, const LightSamples& samples,
+                      std::uint32_t border, const ShadowMapOptions& options, LightMaps& maps, ShadowStats& stats);
+
+/// Receiver i in the map that holds it; nothing at the maps' own point.
+std::optional<MapReceiver> place_in_maps(const LightMaps& maps, const ReceiverArray& receivers, std::size_t i,
+                                         const ShadowMapOptions& options);
 
 /// 0, 1 ... for all receivers, or those that use one set of light samples.
 std::vector<std::uint32_t> all_receivers(const ReceiverArray& receivers);

@@ -64,23 +64,13 @@ void solve_pcf(const LatticeMesh& mesh, const ReceiverArray& receivers, const Li
   const ShadowMapOptions& options = config.shadow_map;
   check_shadow_map_options(options);
   Stopwatch watch;
-  const std::vector<std::uint32_t> all = all_receivers(receivers);
   LightMaps maps;
-  make_light_maps(mesh, receivers,
-                  {.eye = samples.center,
-                   .axes = make_map_axes(samples, receivers),
-                   .border = options.pcf_radius,
-                   .resolution = options.resolution,
-                   .receivers = all},
-                  maps);
-  note_maps(maps, stats);
+  make_center_maps(mesh, receivers, samples, options.pcf_radius, options, maps, stats);
   stats.index_ms += watch.lap();
   visibility.assign(receivers.size(), 1.0f);
   for_each_receiver(receivers, config, [&](std::size_t i) {
-    const DepthMap* map = maps.map_of(dvec3(receivers.position[i]));
-    if (map == nullptr) return;
-    visibility[i] = closer_in_box(place_in_map(*map, receivers.position[i], receivers.normal[i], options),
-                                  static_cast<int>(options.pcf_radius));
+    const std::optional<MapReceiver> place = place_in_maps(maps, receivers, i, options);
+    if (place) visibility[i] = closer_in_box(*place, static_cast<int>(options.pcf_radius));
   });
   stats.test_ms += watch.lap();
 }
@@ -98,10 +88,8 @@ void solve_pcss(const LatticeMesh& mesh, const ReceiverArray& receivers, const L
   stats.index_ms += watch.lap();
   visibility.assign(receivers.size(), 1.0f);
   for_each_receiver(receivers, config, [&](std::size_t i) {
-    const DepthMap* map = search.maps.map_of(dvec3(receivers.position[i]));
-    if (map == nullptr) return;
-    visibility[i] = soft_share(place_in_map(*map, receivers.position[i], receivers.normal[i], options), radius,
-                               search.plane, options);
+    const std::optional<MapReceiver> place = place_in_maps(search.maps, receivers, i, options);
+    if (place) visibility[i] = soft_share(*place, radius, search.plane, options);
   });
   stats.test_ms += watch.lap();
 }

@@ -132,10 +132,8 @@ void solve_shadow_accumulation(const LatticeMesh& mesh, const ReceiverArray& rec
   stats.index_ms += watch.lap();
   std::vector<float> sums(receivers.size(), 0.0f);
   for_each_receiver(receivers, config, [&](std::size_t i) {
-    const DepthMap* map = search.maps.map_of(dvec3(receivers.position[i]));
-    if (map == nullptr) return;
-    sums[i] = static_cast<float>(shadowing_factor(
-        place_in_map(*map, receivers.position[i], receivers.normal[i], options), radius, search.plane, options));
+    const std::optional<MapReceiver> place = place_in_maps(search.maps, receivers, i, options);
+    if (place) sums[i] = static_cast<float>(shadowing_factor(*place, radius, search.plane, options));
   });
   note_sums(sums, stats);
   visibility.resize(receivers.size());

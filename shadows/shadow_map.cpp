@@ -116,24 +116,14 @@ void solve_shadow_map(const LatticeMesh& mesh, const ReceiverArray& receivers, c
   const ShadowMapOptions& options = config.shadow_map;
   check_shadow_map_options(options);
   Stopwatch watch;
-  const std::vector<std::uint32_t> all = all_receivers(receivers);
   LightMaps maps;
-  make_light_maps(mesh, receivers,
-                  {.eye = samples.center,
-                   .axes = make_map_axes(samples, receivers),
-                   .resolution = options.resolution,
-                   .receivers = all},
-                  maps);
-  note_maps(maps, stats);
+  make_center_maps(mesh, receivers, samples, 0, options, maps, stats);
   stats.index_ms += watch.lap();
   visibility.resize(receivers.size());
   parallel_ranges(receivers.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      const DepthMap* map = maps.map_of(dvec3(receivers.position[i]));
-      visibility[i] = 1.0f;
-      if (map == nullptr) continue;
-      const MapReceiver r = place_in_map(*map, receivers.position[i], receivers.normal[i], options);
-      if (r.hidden_at_own_lexel()) visibility[i] = 0.0f;
+      const std::optional<MapReceiver> place = place_in_maps(maps, receivers, i, options);
+      visibility[i] = place && place->hidden_at_own_lexel() ? 0.0f : 1.0f;
     }
   });
   stats.test_ms += watch.lap();

@@ -14,10 +14,8 @@ void look_up(const ReceiverArray& receivers, std::span<const std::uint32_t> some
   parallel_ranges(some.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k != end; ++k) {
       const std::uint32_t i = some[k];
-      const DepthMap* map = maps.map_of(dvec3(receivers.position[i]));
-      if (map == nullptr) continue;
-      const MapReceiver r = place_in_map(*map, receivers.position[i], receivers.normal[i], options);
-      const bool hidden = r.hidden_at_own_lexel();
+      const std::optional<MapReceiver> place = place_in_maps(maps, receivers, i, options);
+      const bool hidden = place && place->hidden_at_own_lexel();
       masks.words[i * masks.words_per_receiver + sample / 64] |= std::uint64_t{hidden} << (sample % 64);
     }
   });

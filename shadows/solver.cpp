@@ -61,17 +61,18 @@ std::span<const MethodTraits> shadow_methods() { return kMethods; }
 const MethodTraits& traits_of(ShadowMethod method) { return kMethods[static_cast<std::size_t>(method)]; }
 ShadowMethod shadow_method_from_name(const std::string& name) { return entry_of(kMethods, name, "method").method; }
 SamplePattern sample_pattern_from_name(const std::string& name) { return entry_of(kPatterns, name, "pattern").value; }
-bool yields_masks(const ShadowConfig& config) {
-  const bool filtered =
-      config.method == ShadowMethod::kSoftTexturedShadowVolumes && config.stsv.filter == OpacityFilter::kFiltered;
-  return traits_of(config.method).masks && !filtered;
+
+namespace {
+
+/// Averaged opacity: neither bits nor exact.
+bool is_filtered(const ShadowConfig& config) {
+  return config.method == ShadowMethod::kSoftTexturedShadowVolumes && config.stsv.filter == OpacityFilter::kFiltered;
 }
 
-bool promises_exactness(const ShadowConfig& config) {
-  const bool filtered =
-      config.method == ShadowMethod::kSoftTexturedShadowVolumes && config.stsv.filter == OpacityFilter::kFiltered;
-  return traits_of(config.method).exact && !filtered;
-}
+}  // namespace
+
+bool yields_masks(const ShadowConfig& config) { return traits_of(config.method).masks && !is_filtered(config); }
+bool promises_exactness(const ShadowConfig& config) { return traits_of(config.method).exact && !is_filtered(config); }
 
 const char* name_of(ShadowMethod method) { return traits_of(method).name; }
 const char* name_of(SamplePattern pattern) { return kPatterns[static_cast<std::size_t>(pattern)].name; }
@@ -196,8 +197,12 @@ void solve_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, c
   }
   VisibilityMasks masks;
   solve_masks(mesh, receivers, light, samples, config, masks, stats);
-  visibility.resize(receivers.size());
-  for (std::size_t i = 0; i < receivers.size(); ++i) visibility[i] = masks.visibility(i);
+  visibility_of(masks, visibility);
+}
+
+void visibility_of(const VisibilityMasks& masks, std::vector<float>& visibility) {
+  visibility.resize(masks.receiver_count);
+  for (std::size_t i = 0; i < masks.receiver_count; ++i) visibility[i] = masks.visibility(i);
 }
 
 namespace {

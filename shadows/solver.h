@@ -24,6 +24,9 @@ bool promises_exactness(const ShadowConfig& config);
 /// What an approximate method takes for granted with this configuration and light, in one line; empty for exact ones.
 std::string method_assumptions(const ShadowConfig& config, const Light& light);
 
+/// Of all receivers.
+void visibility_of(const VisibilityMasks& masks, std::vector<float>& visibility);
+
 /// Calls config.progress if there is one; throws Error{kCancelled} when it returns false.
 void report_progress(const ShadowConfig& config, double done);
 

@@ -15,39 +15,21 @@ namespace HWY_NAMESPACE {
 HWY_INLINE bool FindCrossings(const Blocker& blocker, const KernelSamples& samples, const ScaledPlanes& planes,
                               std::size_t receiver, KernelReceivers& receivers, KernelCounters& counters,
                               std::uint64_t* crossed) {
-  constexpr std::uint32_t kGroup = KernelSamples::kGroup;
-  const std::size_t set = receivers.set[receiver], offset = set * samples.padded,
-                    groups_at = set * samples.group_stride;
   const vec3 r(receivers.x[receiver], receivers.y[receiver], receivers.z[receiver]);
-  const std::uint64_t* mask = receivers.mask(receiver);
   std::fill_n(crossed, receivers.words, 0);
   bool any = false;
-  for (std::size_t word = 0; word < receivers.words; word += 16) {
-    const std::uint64_t open =
-        OpenGroups(samples.valid.data(), mask, word, std::min<std::size_t>(16, receivers.words - word));
-    const GroupBits groups = TestGroups(planes, samples, groups_at + 4 * word, open);
-    for (std::uint64_t rest = groups.possible; rest != 0; rest &= rest - 1) {
-      const std::size_t g = 4 * word + static_cast<std::size_t>(std::countr_zero(rest)), first = g * kGroup;
-      const std::size_t w = first / 64, shift = first % 64;
-      const std::uint64_t wanted = ((samples.valid[w] & ~mask[w]) >> shift) & 0xffff;
-      std::uint64_t inside = wanted, possible = wanted;
-      if (((groups.inside >> (g - 4 * word)) & 1) == 0) {
-        const std::size_t at = offset + first;
-        TestGroup(planes, &samples.x[at], &samples.y[at], &samples.z[at], inside, possible);
-        counters.sample_tests += kGroup;
-        inside &= wanted;
-        possible &= wanted;
-      }
-      for (std::uint64_t doubtful = possible & ~inside; doubtful != 0; doubtful &= doubtful - 1) {
-        const auto bit = static_cast<std::size_t>(std::countr_zero(doubtful));
-        const auto& [a, b, c] = blocker.corner;
-        ++counters.exact_fallbacks;
-        if (crosses(a, b, c, r, samples.points[offset + first + bit])) inside |= std::uint64_t{1} << bit;
-      }
-      crossed[w] |= inside << shift;
-      any = any || inside != 0;
-    }
-  }
+  ForEachPossibleGroup(samples, planes, receiver, receivers, receivers.mask(receiver), nullptr, counters,
+                       [&](std::size_t word, std::size_t shift, std::size_t first, std::uint64_t inside,
+                           std::uint64_t doubtful) HWY_ATTR {
+                         for (; doubtful != 0; doubtful &= doubtful - 1) {
+                           const auto bit = static_cast<std::size_t>(std::countr_zero(doubtful));
+                           const auto& [a, b, c] = blocker.corner;
+                           ++counters.exact_fallbacks;
+                           if (crosses(a, b, c, r, samples.points[first + bit])) inside |= std::uint64_t{1} << bit;
+                         }
+                         crossed[word] |= inside << shift;
+                         any = any || inside != 0;
+                       });
   return any;
 }
 

@@ -54,12 +54,7 @@ struct Result {
   VisibilityMasks masks;
   ShadowStats stats;
   double ms = 0.0;
-  double detail(const std::string& name) const {
-    for (const auto& [key, value] : stats.details) {
-      if (key == name) return value;
-    }
-    throw Error(ErrorCode::kUsage, "no counter " + name);
-  }
+  double detail(const std::string& name) const { return stats.detail(name).value(); }
 };
 
 struct Run {

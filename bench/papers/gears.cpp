@@ -251,15 +251,9 @@ ShadowStats study(const Case& c, ShadowConfig config) {
   return stats;
 }
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == "gears." + name) return value;
-  }
-  throw Error(ErrorCode::kUsage, "no counter gears." + name);
-}
-
 double necessary_percent(const ShadowStats& stats) {
-  return 100.0 * detail(stats, "assignments_necessary") / std::max(1.0, detail(stats, "assignments"));
+  return 100.0 * stats.detail("gears.assignments_necessary").value() /
+         std::max(1.0, stats.detail("gears.assignments").value());
 }
 
 void tables_5_and_6(const Loaded& loaded, const PaperOptions& o) {
@@ -269,9 +263,10 @@ void tables_5_and_6(const Loaded& loaded, const PaperOptions& o) {
   config.gears.refine = true;
   const ShadowStats refined = study(c, config);
   const auto lists = [](const ShadowStats& s) {
-    return fmt::format("{:.0f} {:.0f} {:.0f} {:.1f}", detail(s, "triangles_per_cell_max"),
-                       detail(s, "triangles_per_cell_average"), detail(s, "receivers_per_cell_max"),
-                       detail(s, "receivers_per_cell_average"));
+    return fmt::format("{:.0f} {:.0f} {:.0f} {:.1f}", s.detail("gears.triangles_per_cell_max").value(),
+                       s.detail("gears.triangles_per_cell_average").value(),
+                       s.detail("gears.receivers_per_cell_max").value(),
+                       s.detail("gears.receivers_per_cell_average").value());
   };
   const Subject& p = loaded.subject;
   print_claim("T5 triangles per cell, most and average; pixel samples, most and average: " + loaded.title,
@@ -281,10 +276,10 @@ void tables_5_and_6(const Loaded& loaded, const PaperOptions& o) {
               fmt::format("{} %; {} %", p.necessary, p.refined),
               fmt::format("{:.0f} %; {:.0f} %; with our additions {:.0f} %", necessary_percent(plain),
                           necessary_percent(refined), necessary_percent(ours)));
-  print_claim(
-      "5.3 samples in the box beyond those in the hull: " + loaded.title, fmt::format("{} %", p.box_over_hull),
-      fmt::format("{:.2f} %",
-                  100.0 * (detail(plain, "samples_in_box") / std::max(1.0, detail(plain, "samples_in_hull")) - 1.0)));
+  print_claim("5.3 samples in the box beyond those in the hull: " + loaded.title, fmt::format("{} %", p.box_over_hull),
+              fmt::format("{:.2f} %", 100.0 * (plain.detail("gears.samples_in_box").value() /
+                                                   std::max(1.0, plain.detail("gears.samples_in_hull").value()) -
+                                               1.0)));
 }
 
 /// Section 5.3: hull and refinement bring fewer tests but no speed.

@@ -75,13 +75,6 @@ Work make_work(const Subject& subject, const SceneSource& source, const Row& row
   return work;
 }
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == name) return value;
-  }
-  return 0.0;
-}
-
 /// Rays' time over ours, or nothing without Embree.
 std::string measure_ratio(Work& work, const PaperOptions& options) {
   if (!embree_available()) return "no Embree here";
@@ -98,7 +91,8 @@ std::string measure_ratio(Work& work, const PaperOptions& options) {
                                                         options.repeat);
   const OracleCheck check = check_with_oracle(c, work.masks, 1.0, options.quick ? 0.5 : 5.0);
   return fmt::format("{:.2f} | {} in {} receivers | {:.1f} MiB", times[1].median() / times[0].median(),
-                     check.wrong_bits, check.receivers, detail(work.stats, "hpc.peak_mask_bytes") / 1048576.0);
+                     check.wrong_bits, check.receivers,
+                     work.stats.detail("hpc.peak_mask_bytes").value_or(0.0) / 1048576.0);
 }
 
 void print_row(const Subject& subject, const SceneSource& source, std::size_t row, const PaperOptions& options) {
@@ -126,8 +120,8 @@ void print_optimisations(const Subject& subject, const SceneSource& source, cons
     set_method_option(without, v.setting);
     double with_count = 0.0, without_count = 0.0;
     const std::vector<Timing> times =
-        measure_interleaved({[&] { work.solve(work.config), with_count = detail(work.stats, v.counter); },
-                             [&] { work.solve(without), without_count = detail(work.stats, v.counter); }},
+        measure_interleaved({[&] { work.solve(work.config), with_count = work.stats.detail(v.counter).value_or(0.0); },
+                             [&] { work.solve(without), without_count = work.stats.detail(v.counter).value_or(0.0); }},
                             options.repeat);
     fmt::print("| {} | {} | {:.2f} | {} x {:.2f} |\n", subject.name, v.what, times[1].median() / times[0].median(),
                v.counter, with_count > 0.0 ? without_count / with_count : 0.0);

@@ -39,13 +39,6 @@ struct Run {
   void operator()(const Case& c) { solve_masks(c.mesh, c.receivers, c.light, c.samples, config, masks, stats); }
 };
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == name) return value;
-  }
-  return 0.0;
-}
-
 /// Figure 11 and the abstract: the card through volumes, the mesh through volumes and by the exact engine.
 void card_against_mesh(const PaperOptions& o, std::uint32_t pickets, std::uint32_t samples) {
   Subject card, mesh;
@@ -99,11 +92,11 @@ void memory(const PaperOptions& o) {
   Run run{config, {}, {}};
   run(card.work);
   const double receivers = static_cast<double>(card.work.receivers.size());
-  const double buffer = detail(run.stats, "stsv.light_sample_buffer_bytes");
+  const double buffer = run.stats.detail("stsv.light_sample_buffer_bytes").value_or(0.0);
   print_claim("light sample buffer, bytes per receiver at 64 samples", "8 (8 MB at 1024x1024)",
               fmt::format("{:.2f} ({:.2f} MB for {:.0f} receivers)", buffer / receivers, buffer * 1e-6, receivers));
   print_claim("sample pattern, bytes at 64 samples", "128",
-              fmt::format("{:.0f}", detail(run.stats, "stsv.sample_pattern_bytes")));
+              fmt::format("{:.0f}", run.stats.detail("stsv.sample_pattern_bytes").value_or(0.0)));
   print_claim("all working memory of the method, bytes per receiver", "-",
               fmt::format("{:.1f}", static_cast<double>(run.stats.bytes) / receivers));
 }

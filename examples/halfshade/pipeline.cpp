@@ -158,8 +158,7 @@ void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receive
   } else {
     solve_masks(mesh, receivers, light, samples, config, masks, stats);
   }
-  visibility.resize(receivers.size());
-  for (std::size_t i = 0; i < receivers.size(); ++i) visibility[i] = masks.visibility(i);
+  visibility_of(masks, visibility);
 }
 
 void run_in_arena(int threads, const std::function<void()>& body) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "halfshade/error.h"
@@ -91,6 +92,14 @@ struct ShadowStats {
   std::uint64_t bytes = 0;                             // working memory of the method, without masks
   /// What only one method counts or assumes: "hpc.penumbra_volumes", 1234. In the order they were noted.
   std::vector<std::pair<std::string, double>> details;
+
+  /// What was noted under that name, if anything was.
+  std::optional<double> detail(const std::string& name) const {
+    for (const auto& [key, value] : details) {
+      if (key == name) return value;
+    }
+    return std::nullopt;
+  }
 };
 
 /// A surface point that asks for the light.

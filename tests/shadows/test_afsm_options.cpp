@@ -75,14 +75,6 @@ AliasFreeOptions combination(std::uint32_t bits) {
   return o;
 }
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == name) return value;
-  }
-  FAIL("no detail " << name);
-  return 0.0;
-}
-
 Light small_disk(double radius) {
   Light light = frame_light();
   light.shape = LightShape::kDisk;
@@ -183,9 +175,9 @@ TEST_CASE("one sample settles more than half of the umbra of a ball under a smal
   CHECK(wrong_bits(with, without) == 0);
   std::size_t umbra = 0;
   for (std::size_t i = 0; i < points.size(); ++i) umbra += with.visibility(i) == 0.0f;
-  CHECK(detail(on, "afsm.settled_hidden_receivers") > 0.5 * static_cast<double>(umbra));
+  CHECK(on.detail("afsm.settled_hidden_receivers").value() > 0.5 * static_cast<double>(umbra));
   CHECK(on.pairs_sampled < off.pairs_sampled);
-  CHECK(detail(on, "afsm.silhouette_edges") < 0.2 * detail(on, "afsm.edges_of_closed_meshes"));
+  CHECK(on.detail("afsm.silhouette_edges").value() < 0.2 * on.detail("afsm.edges_of_closed_meshes").value());
 }
 
 TEST_CASE("cuts and culling leave fewer pairs, and tighter outlines fewer cells") {
@@ -216,7 +208,7 @@ TEST_CASE("cuts and culling leave fewer pairs, and tighter outlines fewer cells"
   const auto cells = [&](InfluenceOutline outline) {
     AliasFreeOptions options = plain;
     options.region = outline;
-    return detail(measure(options), "afsm.region_cells");
+    return measure(options).detail("afsm.region_cells").value();
   };
   CHECK(cells(InfluenceOutline::kDodecagon) < cells(InfluenceOutline::kHexagon));
   CHECK(cells(InfluenceOutline::kHull) < cells(InfluenceOutline::kQuad));

@@ -11,23 +11,6 @@ using namespace halfshade::test;
 
 namespace {
 
-std::vector<Triangle> random_triangles(Random& random, int count, double size) {
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const dvec3 center = random.in_box(-4.0, 5.0);
-    Triangle t;
-    for (dvec3& p : t) p = center + size * random.in_box(-1.0, 1.0);
-    triangles.push_back(t);
-  }
-  return triangles;
-}
-
-std::vector<dvec3> random_points(Random& random, int count, double low, double high) {
-  std::vector<dvec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(random.in_box(low, high));
-  return points;
-}
-
 Light light_of_shape(LightShape shape, Random& random) {
   Light light = frame_light();
   light.shape = shape;

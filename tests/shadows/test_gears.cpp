@@ -12,31 +12,6 @@ using namespace halfshade::test;
 
 namespace {
 
-std::vector<Triangle> random_triangles(Random& random, int count, double size, double low = -4.0, double high = 5.0) {
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const dvec3 center = random.in_box(low, high);
-    Triangle t;
-    for (dvec3& p : t) p = center + size * random.in_box(-1.0, 1.0);
-    triangles.push_back(t);
-  }
-  return triangles;
-}
-
-std::vector<dvec3> random_points(Random& random, int count, double low, double high) {
-  std::vector<dvec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(random.in_box(low, high));
-  return points;
-}
-
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == "gears." + name) return value;
-  }
-  FAIL("no detail gears." << name);
-  return 0.0;
-}
-
 VisibilityMasks gears(const Scene& scene, const std::vector<Receiver>& receivers, const ShadowConfig& config,
                       ShadowStats* stats = nullptr, const Light& light = frame_light()) {
   return solve(scene, receivers, light, config, ShadowMethod::kGears, stats);
@@ -258,11 +233,11 @@ TEST_CASE("S24 for GEARS: a crowd in one cell is spread over cells of its own") 
   const VisibilityMasks flat = gears(scene, receivers_at(points), config, &one);
   config.gears.subdivide = true;
   CHECK(wrong_bits(flat, gears(scene, receivers_at(points), config, &many)) == 0);
-  CHECK(detail(one, "receivers_per_cell_max") == 20000);
-  CHECK(detail(many, "receivers_per_cell_max") < 100);
+  CHECK(one.detail("gears.receivers_per_cell_max").value() == 20000);
+  CHECK(many.detail("gears.receivers_per_cell_max").value() < 100);
   const std::vector<dvec3> equal(5000, dvec3(0.0));
   gears(scene, receivers_at(equal), config, &many);
-  CHECK(detail(many, "receivers_per_cell_max") == 5000);
+  CHECK(many.detail("gears.receivers_per_cell_max").value() == 5000);
 }
 
 TEST_CASE("one receiver far away does not make GEARS test all others against every blocker") {
@@ -276,7 +251,7 @@ TEST_CASE("one receiver far away does not make GEARS test all others against eve
   const Light light = frame_light();
   const VisibilityMasks masks = gears(scene, receivers_at(points), config, &far);
   CHECK(wrong_bits(masks, solve(scene, receivers_at(points), light, config, ShadowMethod::kOracle)) == 0);
-  CHECK(detail(far, "receivers_near") < 10);
+  CHECK(far.detail("gears.receivers_near").value() < 10);
   CHECK(far.pairs_tested < 2 * near.pairs_tested);
   config.progress = [last = 0.0](double done) mutable {
     CHECK(done >= last);
@@ -296,21 +271,22 @@ TEST_CASE("the study of GEARS counts assignments: necessary <= in the frustum <=
   config.gears.coarse = false;
   ShadowStats plain, refined, hull;
   gears(scene, receivers, config, &plain);
-  const double necessary = detail(plain, "assignments_necessary"), all = detail(plain, "assignments");
+  const double necessary = plain.detail("gears.assignments_necessary").value(),
+               all = plain.detail("gears.assignments").value();
   CHECK(necessary > 0);
-  CHECK(necessary <= detail(plain, "samples_in_frustum"));
-  CHECK(detail(plain, "samples_in_frustum") <= detail(plain, "samples_in_box"));
-  CHECK(detail(plain, "samples_in_hull") <= detail(plain, "samples_in_box"));
-  CHECK(detail(plain, "samples_in_box") <= all);
+  CHECK(necessary <= plain.detail("gears.samples_in_frustum").value());
+  CHECK(plain.detail("gears.samples_in_frustum").value() <= plain.detail("gears.samples_in_box").value());
+  CHECK(plain.detail("gears.samples_in_hull").value() <= plain.detail("gears.samples_in_box").value());
+  CHECK(plain.detail("gears.samples_in_box").value() <= all);
   config.gears.refine = true;
   gears(scene, receivers, config, &refined);
   config.gears.refine = false;
   config.gears.region = GearsRegion::kHull;
   gears(scene, receivers, config, &hull);
-  CHECK(detail(refined, "assignments") < all);
-  CHECK(detail(hull, "assignments") < all);
-  CHECK(detail(refined, "assignments_necessary") == necessary);
-  CHECK(detail(hull, "assignments_necessary") == necessary);
+  CHECK(refined.detail("gears.assignments").value() < all);
+  CHECK(hull.detail("gears.assignments").value() < all);
+  CHECK(refined.detail("gears.assignments_necessary").value() == necessary);
+  CHECK(hull.detail("gears.assignments_necessary").value() == necessary);
 
   std::uint64_t truth = 0;  // each triangle alone
   config.gears.study = false;

@@ -38,14 +38,6 @@ std::vector<dvec3> floor_and_air(std::uint64_t seed, int count) {
   return points;
 }
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == name) return value;
-  }
-  FAIL("no detail " << name);
-  return 0.0;
-}
-
 VisibilityMasks solve_with(const std::vector<std::string>& settings, const Scene& scene,
                            const std::vector<Receiver>& receivers, const Light& light, ShadowConfig config,
                            ShadowStats* stats = nullptr) {
@@ -90,13 +82,17 @@ TEST_CASE("penumbra casting: optimisations save what they are for") {
     return stats;
   };
   const ShadowStats all = stats_with({});
-  CHECK(detail(all, "hpc.nodes_visited") < detail(stats_with({"hpc.umbra-bits=off"}), "hpc.nodes_visited"));
-  CHECK(detail(all, "hpc.plane_tests") < 0.7 * detail(stats_with({"hpc.plane-sets=off"}), "hpc.plane_tests"));
-  CHECK(detail(all, "hpc.group_volumes") < detail(stats_with({"hpc.lazy-volumes=off"}), "hpc.group_volumes"));
-  CHECK(detail(all, "hpc.peak_mask_bytes") < detail(stats_with({"hpc.masks-on-demand=off"}), "hpc.peak_mask_bytes"));
-  CHECK(detail(stats_with({"hpc.masks-on-demand=off"}), "hpc.peak_masks") == receivers.size());
-  CHECK(detail(all, "hpc.hierarchy_rebuilds") > 0);
-  CHECK(detail(stats_with({"hpc.rebuild=1"}), "hpc.hierarchy_rebuilds") == 0);
+  CHECK(all.detail("hpc.nodes_visited").value() <
+        stats_with({"hpc.umbra-bits=off"}).detail("hpc.nodes_visited").value());
+  CHECK(all.detail("hpc.plane_tests").value() <
+        0.7 * stats_with({"hpc.plane-sets=off"}).detail("hpc.plane_tests").value());
+  CHECK(all.detail("hpc.group_volumes").value() <
+        stats_with({"hpc.lazy-volumes=off"}).detail("hpc.group_volumes").value());
+  CHECK(all.detail("hpc.peak_mask_bytes").value() <
+        stats_with({"hpc.masks-on-demand=off"}).detail("hpc.peak_mask_bytes").value());
+  CHECK(stats_with({"hpc.masks-on-demand=off"}).detail("hpc.peak_masks").value() == receivers.size());
+  CHECK(all.detail("hpc.hierarchy_rebuilds").value() > 0);
+  CHECK(stats_with({"hpc.rebuild=1"}).detail("hpc.hierarchy_rebuilds").value() == 0);
 }
 
 TEST_CASE("penumbra casting: receivers in full umbra keep no mask") {
@@ -107,7 +103,7 @@ TEST_CASE("penumbra casting: receivers in full umbra keep no mask") {
   std::size_t hidden = 0;
   for (std::size_t i = 0; i < receivers.size(); ++i) hidden += masks.visibility(i) == 0.0f;
   CHECK(hidden > 2000);
-  CHECK(detail(stats, "hpc.peak_masks") < 0.9 * static_cast<double>(hidden));
+  CHECK(stats.detail("hpc.peak_masks").value() < 0.9 * static_cast<double>(hidden));
 }
 
 TEST_CASE("penumbra casting: all light shapes and sample numbers agree with the oracle, 8 sample sets included") {
@@ -275,7 +271,7 @@ TEST_CASE("penumbra casting: masks and counters do not depend on the number of t
     tbb::task_arena(threads).execute([&] {
       ShadowStats stats;
       hashes.push_back(solve(scene, receivers, frame_light(), frame_config(64), kHpc, &stats).hash());
-      nodes.push_back(detail(stats, "hpc.nodes_visited"));
+      nodes.push_back(stats.detail("hpc.nodes_visited").value());
     });
   }
   CHECK(hashes[1] == hashes[0]);
@@ -310,7 +306,7 @@ TEST_CASE("streamed penumbra casting: any pieces and parts give the masks of the
       CAPTURE(piece);
       CAPTURE(buckets);
       CHECK(wrong_bits(truth, masks) == 0);
-      CHECK((detail(stats, "hpc.receiver_parts") > 1) == (piece == 97));
+      CHECK((stats.detail("hpc.receiver_parts").value() > 1) == (piece == 97));
     }
   }
 }

@@ -343,12 +343,6 @@ std::uint32_t crossings(const LatticeMesh& mesh, const vec3& r, const vec3& l) {
   return count;
 }
 
-DepthComplexity depth_of(const Scene& scene, const std::vector<dvec3>& points, std::uint32_t samples) {
-  DepthComplexity depth;
-  solve_depth_complexity(scene, receivers_at(points), frame_light(), frame_config(samples), depth);
-  return depth;
-}
-
 }  // namespace
 
 TEST_CASE("depth complexity counts every crossing, ties on shared edges once") {

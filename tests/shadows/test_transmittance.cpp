@@ -143,13 +143,6 @@ std::vector<vec3> light_of(const Scene& scene, const std::vector<Receiver>& poin
   return result;
 }
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == name) return value;
-  }
-  return -1.0;
-}
-
 }  // namespace
 
 TEST_CASE("an attenuation is the logarithm of its transmittance to half a unit, and turns back to it") {
@@ -222,7 +215,7 @@ TEST_CASE("translucent triangles block no sample, and all exact methods agree on
     const VisibilityMasks masks =
         test::solve(g.scene, points, test::frame_light(), test::frame_config(), method, &stats);
     CHECK(test::wrong_bits(truth, masks) == 0);
-    CHECK(detail(stats, "translucent_triangles") == static_cast<double>(g.scene.triangles.size() - 12));
+    CHECK(stats.detail("translucent_triangles").value() == static_cast<double>(g.scene.triangles.size() - 12));
   }
 }
 
@@ -312,8 +305,8 @@ TEST_CASE("S04 a segment through the edge of two panes, or a vertex of many, is 
   ShadowStats stats;
   const auto light = light_of(g.scene, test::receivers_at(points), test::frame_light(), test::frame_config(), &stats);
   for (const vec3& rgb : light) CHECK(rgb == vec3(0.5f));
-  CHECK(detail(stats, "transmittance.crossings") == 256.0 * static_cast<double>(points.size()));
-  CHECK(detail(stats, "transmittance.exact_fallbacks") > 1000.0);
+  CHECK(stats.detail("transmittance.crossings").value() == 256.0 * static_cast<double>(points.size()));
+  CHECK(stats.detail("transmittance.exact_fallbacks").value() > 1000.0);
 }
 
 TEST_CASE("a closed body is crossed twice, and sheets written with both sides once") {
@@ -339,7 +332,7 @@ TEST_CASE("a closed body is crossed twice, and sheets written with both sides on
   for (const vec3& rgb : light_of(sheet.scene, points, test::frame_light(), test::frame_config(), &stats)) {
     CHECK(rgb == vec3(0.5f));
   }
-  CHECK(detail(stats, "transmittance.repeated_triangles") == 2.0);
+  CHECK(stats.detail("transmittance.repeated_triangles").value() == 2.0);
 }
 
 TEST_CASE("the receiver's own pane does not dim it, under either of its numbers") {
@@ -413,7 +406,7 @@ TEST_CASE("without panes the light is the visibility, for receivers on both side
       test::solve(g.scene, points, test::frame_light(), test::frame_config(), ShadowMethod::kExact);
   for (std::size_t i = 0; i < points.size(); ++i) CHECK(light[i] == vec3(masks.visibility(i)));
   CHECK(light.back() == vec3(0.0f));
-  CHECK(detail(stats, "translucent_triangles") == -1.0);
+  CHECK(stats.detail("translucent_triangles") == std::nullopt);
 }
 
 TEST_CASE("methods without masks say how many translucent triangles they approximate, and are right without overlap") {
@@ -431,8 +424,8 @@ TEST_CASE("methods without masks say how many translucent triangles they approxi
       CHECK(rgb.x == 1.0f);
       CHECK(std::fabs(rgb.y - 0.25f) < 1e-5f);
     }
-    CHECK(detail(stats, "translucent_triangles") == 2.0);
-    CHECK(detail(stats, "translucent_triangles_approximated") == 2.0);
+    CHECK(stats.detail("translucent_triangles").value() == 2.0);
+    CHECK(stats.detail("translucent_triangles_approximated").value() == 2.0);
   }
 }
 

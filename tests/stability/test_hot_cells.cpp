@@ -8,14 +8,6 @@ using namespace halfshade::test;
 
 namespace {
 
-double detail(const ShadowStats& stats, const std::string& name) {
-  for (const auto& [key, value] : stats.details) {
-    if (key == "gears." + name) return value;
-  }
-  FAIL("no detail gears." << name);
-  return 0.0;
-}
-
 VisibilityMasks gears(const Scene& scene, const std::vector<Receiver>& receivers, const ShadowConfig& config,
                       ShadowStats* stats = nullptr, const Light& light = frame_light()) {
   return solve(scene, receivers, light, config, ShadowMethod::kGears, stats);
@@ -50,9 +42,9 @@ TEST_CASE(
       config.gears.pair_budget = budget;
       ShadowStats stats;
       CHECK(wrong_bits(truth, gears(scene, receivers, config, &stats)) == 0);
-      CHECK(detail(stats, "pairs_in_flight_max") <= budget);
-      CHECK(detail(stats, "assignments") > 100000);  // more than any of the budgets, in cells
-      if (!coarse && budget == 20000u) CHECK(detail(stats, "batches") > 3);
+      CHECK(stats.detail("gears.pairs_in_flight_max").value() <= budget);
+      CHECK(stats.detail("gears.assignments").value() > 100000);  // more than any of the budgets, in cells
+      if (!coarse && budget == 20000u) CHECK(stats.detail("gears.batches").value() > 3);
     }
   }
 }
@@ -70,7 +62,7 @@ TEST_CASE("S25 hot_cell_memory: gears: memory grows with the swarm's size, not w
     const Scene scene = scene_of(swarm_at_light(random, k == 0 ? 20000 : 40000));
     gears(scene, receivers_at(points), config, &stats);
     bytes[k] = static_cast<double>(stats.bytes);
-    CHECK(detail(stats, "pairs_in_flight_max") <= config.gears.pair_budget);
+    CHECK(stats.detail("gears.pairs_in_flight_max").value() <= config.gears.pair_budget);
   }
   CHECK(bytes[0] < 100e6);
   CHECK(bytes[1] < 2.1 * bytes[0]);

@@ -7,16 +7,6 @@
 using namespace halfshade;
 using namespace halfshade::test;
 
-namespace {
-
-DepthComplexity depth_of(const Scene& scene, const std::vector<dvec3>& points, std::uint32_t samples) {
-  DepthComplexity depth;
-  solve_depth_complexity(scene, receivers_at(points), frame_light(), frame_config(samples), depth);
-  return depth;
-}
-
-}  // namespace
-
 TEST_CASE("S04 split_quad: a segment through the edge that two quads share counts one surface") {
   const auto halves = joined(quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}),
                              quad({0, 2, -64}, {64, 2, -64}, {64, 2, 64}, {0, 2, 64}));

@@ -4,6 +4,7 @@
 #include <bit>
 #include <random>
 
+#include "halfshade/depth_complexity.h"
 #include "halfshade/shadows.h"
 
 namespace halfshade::test {
@@ -112,5 +113,30 @@ struct Random {
     return {x, y, uniform(low, high)};
   }
 };
+
+inline std::vector<Triangle> random_triangles(Random& random, int count, double size, double low = -4.0,
+                                              double high = 5.0) {
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < count; ++i) {
+    const dvec3 center = random.in_box(low, high);
+    Triangle t;
+    for (dvec3& p : t) p = center + size * random.in_box(-1.0, 1.0);
+    triangles.push_back(t);
+  }
+  return triangles;
+}
+
+inline std::vector<dvec3> random_points(Random& random, int count, double low, double high) {
+  std::vector<dvec3> points;
+  for (int i = 0; i < count; ++i) points.push_back(random.in_box(low, high));
+  return points;
+}
+
+/// What lies between points and the samples of frame_light().
+inline DepthComplexity depth_of(const Scene& scene, const std::vector<dvec3>& points, std::uint32_t samples) {
+  DepthComplexity depth;
+  solve_depth_complexity(scene, receivers_at(points), frame_light(), frame_config(samples), depth);
+  return depth;
+}
 
 }  // namespace halfshade::test
