@@ -107,7 +107,7 @@ void solve_side(const LatticeMesh& mesh, const ReceiverArray& receivers, const K
   const SampleRectangles rectangles = make_rectangles(samples, frame);
   stats.cull_ms += watch.lap();
   const ExactScene scene{&tree, &samples, &rectangles, &rows, frame};
-  const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
+  const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch> scratches(kTasksPerRound);
