@@ -241,9 +241,10 @@ HWY_INLINE HalfPlane SolveForX(const SampleRows& rows, Vec a, Vec b, Vec c, Vec 
   const Vec p = hn::Neg(hn::Mul(c, inverse));
   HalfPlane h;
   h.slope = hn::Neg(hn::Mul(b, inverse));
-  // p, q and p + q y are each within six units of 2^-24; columns are rounded at 2^-16.
+  // p, q and p + q y are each within six units of 2^-24; columns are rounded at 2^-16 of one, and to whole ones by adding
+  // a half less that much.
   const Vec rounding = hn::MulAdd(hn::Abs(h.slope), hn::Set(d, rows.reach_y), hn::Abs(p));
-  const Vec slack = hn::MulAdd(rounding, hn::Set(d, 0x1p-20f), hn::Set(d, 0x1p-16f));
+  const Vec slack = hn::MulAdd(rounding, hn::Set(d, 0x1p-20f), hn::Set(d, 0x1p-15f));
   const Vec width = hn::MulAdd(hn::Mul(error, hn::Set(d, 1.0f + 0x1p-20f)), hn::Abs(inverse), slack);
   h.least = hn::Sub(p, width);
   h.most = hn::Add(p, width);
@@ -267,27 +268,25 @@ struct Limits {
 constexpr Limits kLimits[8] = {{{0, 0}, {0, 0}}, {{0, 0}, {1, 2}}, {{1, 1}, {0, 2}}, {{0, 1}, {2, 2}},
                                {{2, 2}, {0, 1}}, {{0, 2}, {1, 1}}, {{1, 2}, {0, 0}}, {{0, 0}, {0, 0}}};
 
-/// Bits of the columns between low and high.
+/// Bits of the columns between low and high, rounded to whole ones within HalfPlane's slack.
 HWY_INLINE UintVec ColumnsBetween(Vec low, Vec high, Vec offset, Vec rest) {
   const Tag d;
-  const IntTag di;
   const UintTag du;
-  const Vec zero = hn::Zero(d), word = hn::Set(d, 32.0f);
-  const Vec from = hn::Ceil(hn::Min(hn::Max(hn::Add(low, offset), zero), word));  // columns left out at the start
-  const Vec past = hn::Ceil(hn::Min(hn::Max(hn::Sub(rest, high), zero), word));   // and at the end
-  const auto some = hn::RebindMask(du, hn::Lt(hn::Add(from, past), word));
-  auto first = hn::BitCast(du, hn::ConvertTo(di, from)), last = hn::BitCast(du, hn::ConvertTo(di, past));
-#if HWY_TARGET == HWY_SCALAR
-  first = hn::And(first, hn::Set(du, 31u)), last = hn::And(last, hn::Set(du, 31u));
+  // A float of 2^23 and more is a whole number, which stands in its lowest bits.
+  const Vec shifter = hn::Set(d, 0x1p23f), zero = hn::Zero(d);
+  const UintVec shifter_bits = hn::Set(du, 0x4b000000u), ones = hn::Set(du, ~0u);
+  const Vec from = hn::Add(hn::Max(hn::Add(low, offset), zero), shifter);  // columns left out at the start
+  const Vec past = hn::Add(hn::Max(hn::Sub(rest, high), zero), shifter);   // and at the end
+  const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits), last = hn::Sub(hn::BitCast(du, past), shifter_bits);
+#if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86  // shifts by 32 and more leave nothing
+  return hn::And(hn::Shl(ones, first), hn::Shr(ones, last));
+#else
+  const UintVec most = hn::Set(du, 31u);
+  const auto some = hn::And(hn::RebindMask(du, hn::Lt(from, hn::Set(d, 0x1p23f + 32.0f))),
+                            hn::RebindMask(du, hn::Lt(past, hn::Set(d, 0x1p23f + 32.0f))));
+  return hn::IfThenElseZero(some, hn::And(hn::Shl(ones, hn::And(first, most)), hn::Shr(ones, hn::And(last, most))));
 #endif
-  const UintVec ones = hn::Set(du, ~0u);
-  return hn::IfThenElseZero(some, hn::And(hn::Shl(ones, first), hn::Shr(ones, last)));
 }
-
-/// Samples of a line that may be inside and that certainly are.
-struct LineBits {
-  UintVec possible, inside;
-};
 
 /// The picture of a triangle, line by line.
 ///
@@ -307,7 +306,7 @@ class Outline {
     simple_ = alike && way != 0 && way != 7;
     const Limits& limits = kLimits[way];
     for (int k = 0; k < 2; ++k) {
-      low_[k] = triangle.planes[limits.low[k]], high_[k] = triangle.planes[limits.high[k]];
+      low_[k] = &triangle.planes[limits.low[k]], high_[k] = &triangle.planes[limits.high[k]];
     }
   }
 
@@ -315,16 +314,16 @@ class Outline {
   HWY_INLINE UintVec possible(Vec y, Vec offset, Vec rest) const {
     if (!simple_) return all_limits(y, offset, rest, true);
     const auto at = [&](Vec p, Vec q) { return hn::MulAdd(q, y, p); };
-    return ColumnsBetween(hn::Max(at(low_[0].least, low_[0].slope), at(low_[1].least, low_[1].slope)),
-                          hn::Min(at(high_[0].most, high_[0].slope), at(high_[1].most, high_[1].slope)), offset, rest);
+    return ColumnsBetween(hn::Max(at(low_[0]->least, low_[0]->slope), at(low_[1]->least, low_[1]->slope)),
+                          hn::Min(at(high_[0]->most, high_[0]->slope), at(high_[1]->most, high_[1]->slope)), offset, rest);
   }
 
   /// Samples that are certainly inside.
   HWY_INLINE UintVec inside(Vec y, Vec offset, Vec rest) const {
     if (!simple_) return all_limits(y, offset, rest, false);
     const auto at = [&](Vec p, Vec q) { return hn::MulAdd(q, y, p); };
-    return ColumnsBetween(hn::Max(at(low_[0].most, low_[0].slope), at(low_[1].most, low_[1].slope)),
-                          hn::Min(at(high_[0].least, high_[0].slope), at(high_[1].least, high_[1].slope)), offset,
+    return ColumnsBetween(hn::Max(at(low_[0]->most, low_[0]->slope), at(low_[1]->most, low_[1]->slope)),
+                          hn::Min(at(high_[0]->least, high_[0]->slope), at(high_[1]->least, high_[1]->slope)), offset,
                           rest);
   }
 
@@ -344,7 +343,7 @@ class Outline {
   const PacketTriangle& triangle_;
   const std::array<LaneMask, 4>& up_;
   bool simple_;
-  HalfPlane low_[2], high_[2];
+  const HalfPlane *low_[2], *high_[2];
 };
 
 /// A packet at work on its receivers.
@@ -386,8 +385,7 @@ class PacketSolver {
   HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range);
   HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const PictureRange& range, LaneMask below, LaneMask active);
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
-  void Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible, std::uint32_t* inside,
-              std::optional<TexelLookup>* texels);
+  void Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible, std::uint32_t* inside);
 
   vec3 Position(std::size_t lane) const {
     const std::size_t i = packet_.first + lane;
@@ -401,6 +399,7 @@ class PacketSolver {
   KernelCounters& counters_;
   Packet packet_;
   std::uint64_t changed_lines_[kMaxLines / 64];
+  std::optional<TexelLookup> texels_[kMaxLanes];  // of the perforated triangle at work, made when first needed
 };
 
 /// Positions, boxes and pictures; all samples are open.
@@ -552,7 +551,7 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
 
 /// Doubtful and perforated samples of a line; `possible` and `inside` are per receiver.
 void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible,
-                          std::uint32_t* inside, std::optional<TexelLookup>* texels) {
+                          std::uint32_t* inside) {
   const auto& [a, b, c] = triangle.corner;
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     if (possible[lane] == 0) continue;
@@ -565,8 +564,8 @@ void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, co
     }
     if (!triangle.perforated || inside[lane] == 0) continue;
     const AlphaTriangle& alpha = *triangle.blocker->alpha;
-    if (!texels[lane]) texels[lane].emplace(alpha, Position(lane));
-    inside[lane] = OpaqueSamples(alpha, *texels[lane], Position(lane), &rows_.point_x[first], &rows_.point_y[first],
+    if (!texels_[lane]) texels_[lane].emplace(alpha, Position(lane));
+    inside[lane] = OpaqueSamples(alpha, *texels_[lane], Position(lane), &rows_.point_x[first], &rows_.point_y[first],
                                  &rows_.point_z[first], inside[lane], counters_.exact_fallbacks);
   }
 }
@@ -578,7 +577,6 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
   const std::array<LaneMask, 4> up = Orient(triangle, below);
   const Outline outline(triangle, up, Bits(active));
   const auto wanted = hn::VecFromMask(du, hn::RebindMask(du, active));
-  std::optional<TexelLookup> texels[kMaxLanes];
   bool added = false;
   range.for_open_lines(rows_, packet_, [&](std::uint32_t line) HWY_ATTR {
     const PictureLines& l = *packet_.lines;
@@ -591,7 +589,7 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
     if (triangle.perforated || !hn::AllTrue(du, hn::Eq(possible, inside))) {
       alignas(HWY_MAX_BYTES) std::uint32_t may[kMaxLanes], does[kMaxLanes];
       hn::Store(possible, du, may), hn::Store(inside, du, does);
-      Settle(triangle, line, may, does, texels);
+      Settle(triangle, line, may, does);
       inside = hn::Load(du, does);
       if (hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)))) return false;
     }
@@ -614,6 +612,7 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t 
   PacketTriangle triangle;
   triangle.blocker = &scene_.tree->blockers[leaf.first + lane];
   triangle.perforated = (leaf.perforated >> lane) & 1;
+  if (triangle.perforated) std::fill(std::begin(texels_), std::end(texels_), std::nullopt);
   for (std::size_t k = 0; k < 3; ++k) {
     triangle.corner[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
   }
@@ -664,7 +663,7 @@ void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::s
   for (std::uint32_t line = 0; line < rows.lines; ++line) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const std::size_t at = std::size_t{set[std::min(lane, count - 1)]} * rows.lines + line;
-      y[line][lane] = rows.y[at], offset[line][lane] = rows.offset[at], rest[line][lane] = 31.0f - rows.offset[at];
+      y[line][lane] = rows.y[at], offset[line][lane] = rows.offset[at] + 0.5f, rest[line][lane] = 31.5f - rows.offset[at];
     }
   }
   placed = alike ? set[0] : kMixed;
