@@ -444,6 +444,7 @@ struct PatchOutline {
   std::uint32_t count = 0;
   std::uint8_t from[kMost + 1], to[kMost + 1];
   alignas(HWY_MAX_BYTES) float slope[kMost + 1][kMaxLanes], width[kMost + 1][kMaxLanes];  // columns a row; uncertainty
+  std::uint32_t on_row[SampleRows::kMaxRows];  // edges that cross the row for some receiver, as bits
 };
 
 /// A packet at work on its receivers.
@@ -611,9 +612,11 @@ std::uint32_t PacketSolver::FindPatch(const BlockerTree::Leaf& leaf) {
   const LeafView& view = view_;
   std::uint32_t patch = ((view.above & ~leaf.samples_below) | (view.below & ~leaf.samples_above)) & view.bounded &
                         view.active & ~leaf.perforated;
+  const float most = 0.02f / std::max(rows_.scale, rows_.row_scale);
   for (std::uint32_t rest = patch; rest != 0; rest &= rest - 1) {
     const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    if (!hn::AllFalse(du, hn::Eq(packet_.own, hn::Set(du, leaf.triangle[lane])))) patch &= ~(1u << lane);
+    const bool is_own = !hn::AllFalse(du, hn::Eq(packet_.own, hn::Set(du, leaf.triangle[lane])));
+    if (is_own || view.pad[lane] > most) patch &= ~(1u << lane);
   }
   const int wanted = std::popcount(patch & view.kept);
   if (wanted < 3) return 0;
@@ -664,6 +667,7 @@ HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std:
     on_row = hn::Or(on_row, hn::And(hn::Le(hn::Abs(hn::Sub(row, nearest)), error),
                                     hn::And(hn::Ge(nearest, hn::Zero(d)), hn::Lt(nearest, end))));
   }
+  std::fill_n(outline_.on_row, rows_.rows, 0u);
   for (std::uint32_t e = 0; e < outline_.count; ++e) {
     const std::size_t a = outline_.from[e], b = outline_.to[e];
     const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
@@ -673,8 +677,16 @@ HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std:
                               hn::Set(d, rows_.deviation));
     Vec width = hn::Mul(error, hn::MulAdd(hn::Abs(slope), row_scale, hn::Set(d, rows_.scale)));
     width = hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(dx)), hn::Set(d, 0x1p-20f), width);
+    width = hn::Add(width, hn::Set(d, 0x1p-16f));
     hn::Store(slope, d, outline_.slope[e]);
-    hn::Store(hn::Add(width, hn::Set(d, 0x1p-16f)), d, outline_.width[e]);
+    hn::Store(width, d, outline_.width[e]);
+    // Edges to the right of the picture hide nothing of it.
+    const Vec left = hn::Sub(hn::Min(xa, hn::Add(xa, dx)), width), yb = hn::Add(ya, dy);
+    if (hn::AllTrue(d, hn::Gt(left, hn::Set(d, static_cast<float>(rows_.columns) - rows_.least_offset)))) continue;
+    const float low = hn::GetLane(hn::MinOfLanes(d, hn::Min(ya, yb))), high = hn::GetLane(hn::MaxOfLanes(d, hn::Max(ya, yb)));
+    const auto first = static_cast<std::int32_t>(std::max(low + rows_.least_row_offset - 1e-3f, 0.0f));
+    const float last = std::min(high + rows_.most_row_offset + 1e-3f, static_cast<float>(rows_.rows) - 1.0f);
+    for (std::int32_t row = first; static_cast<float>(row) <= last; ++row) outline_.on_row[row] |= 1u << e;
   }
   return hn::Not(on_row);
 }
@@ -706,12 +718,12 @@ HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful)
   const UintVec zero = hn::Zero(du), ones = hn::Set(du, ~0u), shifter_bits = hn::Set(du, 0x4b000000u);
   WindingNumbers winding{{zero, zero, zero, zero}};
   doubtful = zero;
-  for (std::uint32_t e = 0; e < outline_.count; ++e) {
+  for (std::uint32_t edges = outline_.on_row[line % rows_.rows]; edges != 0; edges &= edges - 1) {
+    const auto e = static_cast<std::size_t>(std::countr_zero(edges));
     const std::size_t a = outline_.from[e], b = outline_.to[e];
     const Vec ya = hn::Load(d, vertices_.row[a]);
     const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
     const LaneMask crossing = hn::Xor(behind, before);
-    if (hn::AllFalse(d, crossing)) continue;
     const Vec x = hn::MulAdd(hn::Load(d, outline_.slope[e]), hn::Sub(y, ya), hn::Load(d, vertices_.column[a]));
     const Vec place = hn::Min(hn::Max(hn::Add(x, offset), hn::Zero(d)), hn::Set(d, 33.0f));
     const Vec from = hn::Add(place, shifter);
