@@ -12,10 +12,10 @@ namespace halfshade {
 
 /// A mesh as the caller holds it.
 struct MeshView {
-  PointView positions;              // object space
-  TriangleView triangles;           // counter-clockwise seen from outside; empty: vertices 0 1 2, 3 4 5, ...
-  Transform transform;              // object to world
-  UvView uvs;                       // per vertex; needed with an alpha map, ignored without
+  PointView positions = {};         // object space
+  TriangleView triangles = {};      // counter-clockwise seen from outside; empty: vertices 0 1 2, 3 4 5, ...
+  Transform transform = {};         // object to world
+  UvView uvs = {};                  // per vertex; needed with an alpha map, ignored without
   std::uint32_t alpha_map = kNone;  // number of an alpha map of the scene: light passes where the texel is not opaque
   float alpha_cutoff = 0.5f;        // a texel is opaque where alpha / 255 >= alpha_cutoff
   vec3 albedo{0.8f};                // linear RGB; for GBuffer::albedo alone

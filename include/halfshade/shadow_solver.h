@@ -13,14 +13,14 @@ inline constexpr double kReceiverLift = 0x1p-21;
 
 /// Points that ask for light, in the caller's memory.
 struct ReceiverView {
-  PointView positions;  // world space
+  PointView positions = {};  // world space
   /// Geometric normals on the side that is asked, of any length; or empty. With normals, receivers are lifted, samples
   /// at or below a receiver's tangent plane do not light it (a receiver for which that is all of them is blocked in
   /// every sample without being traced), and irradiance can be asked for.
-  PointView normals;
+  PointView normals = {};
   /// Own triangle, which never blocks the receiver: number of the mesh, and of the triangle in it; kNone = none. Both
   /// empty: none has one.
-  IndexView meshes, triangles;
+  IndexView meshes = {}, triangles = {};
   double lift = kReceiverLift;  // 0..1; counts for nothing without normals
   /// Number of receiver 0, from which sets of light samples are chosen (ShadowConfig::sample_sets): a part of the
   /// receivers gets the same samples as in a call for all of them.
@@ -34,15 +34,15 @@ struct ReceiverView {
 struct ShadowOutput {
   /// [light][receiver][word], words = ShadowSolver::mask_words(lights): bit i is set where sample i of the light is
   /// hidden. Bits past a light's sample count are zero.
-  std::span<std::uint64_t> masks;
-  std::span<float> visibility;  // [light][receiver]: fraction of samples not hidden, in [0, 1]
+  std::span<std::uint64_t> masks = {};
+  std::span<float> visibility = {};  // [light][receiver]: fraction of samples not hidden, in [0, 1]
   /// [light][receiver] linear RGB: what the light's visible samples send to a surface with the receiver's normal,
   ///   E = sum over visible samples of emission * area / samples * cos(receiver) * cos(light) / distance^2
   /// in world units; emission is radiance. Spheres and ellipsoids emit from their surface. Points and explicit samples
   /// have neither area nor cos(light): emission is intensity, shared by the samples. An emission image replaces
   /// `emission` sample by sample. Two-sided lights emit to both sides.
-  std::span<vec3> irradiance;
-  std::span<vec3> total_irradiance;  // [receiver]: sum over lights, in their order
+  std::span<vec3> irradiance = {};
+  std::span<vec3> total_irradiance = {};  // [receiver]: sum over lights, in their order
 };
 
 /// Counters and times of one call, summed over its lights.
