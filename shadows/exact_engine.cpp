@@ -141,7 +141,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
   const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
-  const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
+  const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch>& scratches = work.scratches;
