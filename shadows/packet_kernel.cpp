@@ -30,6 +30,7 @@ struct Packet {
   std::size_t first = 0, count = 0;
   Vec3 position, to_center;           // lattice; from there to the light's centre
   Vec distance;                       // bound on |coordinate| of receiver to sample
+  Vec column, row, height;  // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                        // own triangle
   vec3 low, high;                     // box around the receivers, lattice
   Shaft shaft;                        // the same in the light's frame, and a rectangle around what is open of the light
@@ -126,7 +127,9 @@ HWY_INLINE std::uint64_t BoxesOverOpenSamples(const SampleRows& rows, const floa
 struct PacketView {
   std::uint64_t above = 0, below = 0;  // the plane lies above (below) all receivers, along the triangle's normal
   std::uint64_t active = 0;            // may hide something from some receiver
+  std::uint64_t bounded = 0;           // all of it projects onto the light's plane
   LaneRectangles on_light;
+  alignas(HWY_MAX_BYTES) float pad[kMaxLanes];  // rounding of a corner's place on the light, in lengths
 };
 
 /// On which side of the planes the packet's box lies, and so whether they separate it from samples.
@@ -154,13 +157,14 @@ HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const Pa
 /// from the point `from` amid them. From r, a point v projects
 /// to v + (v - r) w with w = v_z / (r_z - v_z).
 HWY_INLINE void ProjectOntoLight(const LightFrame& frame, const std::array<Vec3, 3>& to_corner, const vec3& from,
-                                 const Shaft& box, LaneRectangles& q) {
+                                 const Shaft& box, PacketView& view) {
   const Tag d;
   const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
+  LaneRectangles& q = view.on_light;
   const vec3 middle(frame.to_frame(dvec3(from)));
   float half[3];
   for (int k = 0; k < 3; ++k) half[k] = std::max(box.high[k] - middle[k], middle[k] - box.low[k]) + 1e-6f;
-  Vec least = hn::Set(d, 1e30f), farthest = hn::Zero(d), widest = hn::Zero(d);
+  Vec least = hn::Set(d, 1e30f), farthest = hn::Zero(d);
   Vec nearest[2] = {least, least}, last[2] = {hn::Neg(least), hn::Neg(least)};  // of (v - r)
   Vec place_low[2] = {least, least}, place_high[2] = {hn::Neg(least), hn::Neg(least)};
   for (int axis = 0; axis < 2; ++axis) q.low[axis] = least, q.high[axis] = hn::Neg(least);
@@ -170,7 +174,6 @@ HWY_INLINE void ProjectOntoLight(const LightFrame& frame, const std::array<Vec3,
     least = hn::Min(least, near);
     farthest = hn::Max(farthest, Norm1(c));
     const Vec w0 = hn::Div(z, near), w1 = hn::Div(z, far);
-    widest = hn::Max(widest, hn::Max(hn::Abs(w0), hn::Abs(w1)));
     for (int axis = 0; axis < 2; ++axis) {
       const Vec away = Dot(c, axes[axis]), place = hn::Add(away, hn::Set(d, middle[axis]));
       const Vec a = hn::Sub(away, hn::Set(d, half[axis])), b = hn::Add(away, hn::Set(d, half[axis]));
@@ -186,6 +189,8 @@ HWY_INLINE void ProjectOntoLight(const LightFrame& frame, const std::array<Vec3,
   const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
   const Vec magnified = hn::Div(hn::Mul(farthest, hn::Set(d, 1e-6f * (box.high[2] + 4.0f))), least);
   const Vec pad = hn::Add(magnified, hn::Set(d, ProjectionPad(box.low[2])));
+  view.bounded = Bits(bounded);
+  hn::Store(pad, d, view.pad);
   const Vec everywhere = hn::Set(d, 1e9f), margin = hn::Set(d, 2e-5f);
   for (int axis = 0; axis < 2; ++axis) {
     const Vec low =
@@ -209,8 +214,100 @@ HWY_INLINE PacketView ViewTriangles(const ExactScene& scene, const BlockerTree::
   }
   PacketView view;
   FindSides(leaf, i, packet, half, to_corner[0], view);
-  if (view.active != 0) ProjectOntoLight(scene.frame, to_corner, middle, packet.shaft, view.on_light);
+  if (view.active != 0) ProjectOntoLight(scene.frame, to_corner, middle, packet.shaft, view);
   return view;
+}
+
+/// Vertices of a leaf as each receiver sees them before the light, in columns and rows.
+struct ProjectedVertices {
+  alignas(HWY_MAX_BYTES) float column[3 * BlockerTree::kWidth][kMaxLanes], row[3 * BlockerTree::kWidth][kMaxLanes];
+};
+
+/// Those in `wanted`, which must lie between the receivers and the light.
+HWY_INLINE void ProjectVertices(const ExactScene& scene, const BlockerTree::Leaf& leaf, std::uint64_t wanted,
+                                const Packet& packet, ProjectedVertices& projected) {
+  const Tag d;
+  const SampleRows& rows = *scene.rows;
+  const Vec3 axis_x = Splat(rows.axis_x * rows.scale), axis_y = Splat(rows.axis_y * rows.row_scale),
+             down = Splat(vec3(-scene.frame.n));
+  for (; wanted != 0; wanted &= wanted - 1) {
+    const auto v = static_cast<std::size_t>(std::countr_zero(wanted));
+    const Vec3 way = Subtract(Splat({leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]}), packet.position);
+    const Vec scale = hn::Div(packet.height, Dot(way, down));
+    hn::Store(hn::MulAdd(Dot(way, axis_x), scale, packet.column), d, projected.column[v]);
+    hn::Store(hn::MulAdd(Dot(way, axis_y), scale, packet.row), d, projected.row[v]);
+  }
+}
+
+/// Bits of the columns between low and high, rounded to whole ones within HalfPlane's slack.
+HWY_INLINE UintVec ColumnsBetween(Vec low, Vec high, Vec offset, Vec rest) {
+  const Tag d;
+  const UintTag du;
+  // A float of 2^23 and more is a whole number, which stands in its lowest bits.
+  const Vec shifter = hn::Set(d, 0x1p23f), zero = hn::Zero(d);
+  const UintVec shifter_bits = hn::Set(du, 0x4b000000u), ones = hn::Set(du, ~0u);
+  const Vec from = hn::Add(hn::Max(hn::Add(low, offset), zero), shifter);  // columns left out at the start
+  const Vec past = hn::Add(hn::Max(hn::Sub(rest, high), zero), shifter);   // and at the end
+  const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits), last = hn::Sub(hn::BitCast(du, past), shifter_bits);
+#if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86  // shifts by 32 and more leave nothing
+  return hn::And(hn::Shl(ones, first), hn::Shr(ones, last));
+#else
+  const UintVec most = hn::Set(du, 31u);
+  const auto some = hn::And(hn::RebindMask(du, hn::Lt(from, hn::Set(d, 0x1p23f + 32.0f))),
+                            hn::RebindMask(du, hn::Lt(past, hn::Set(d, 0x1p23f + 32.0f))));
+  return hn::IfThenElseZero(some, hn::And(hn::Shl(ones, hn::And(first, most)), hn::Shr(ones, hn::And(last, most))));
+#endif
+}
+
+/// Lines of the picture, as bits.
+struct LineSet {
+  std::uint64_t bits[kMaxLines / 64] = {};
+  void add(std::uint32_t line) { bits[line / 64] |= std::uint64_t{1} << (line % 64); }
+  bool has(std::uint32_t line) const { return (bits[line / 64] >> (line % 64)) & 1; }
+  template <class Visit>
+  HWY_INLINE void for_each(const Visit& visit) const {
+    for (std::uint32_t word = 0; word < kMaxLines / 64; ++word) {
+      for (std::uint64_t rest = bits[word]; rest != 0; rest &= rest - 1) {
+        visit(64 * word + static_cast<std::uint32_t>(std::countr_zero(rest)));
+      }
+    }
+  }
+};
+
+/// The receivers that have a sample open in the rectangle around a projected triangle, and the lines where they have.
+HWY_INLINE LaneMask ReceiversOverOpenSamples(const SampleRows& rows, const std::array<std::uint8_t, 3>& corner,
+                                             float pad, const ProjectedVertices& v, const PictureRange& range,
+                                             const Packet& packet, LineSet& lines) {
+  const Tag d;
+  const UintTag du;
+  constexpr float kSlack = 1e-3f;
+  const auto least = [&](const float(*p)[kMaxLanes]) HWY_ATTR {
+    return hn::Min(hn::Load(d, p[corner[0]]), hn::Min(hn::Load(d, p[corner[1]]), hn::Load(d, p[corner[2]])));
+  };
+  const auto most = [&](const float(*p)[kMaxLanes]) HWY_ATTR {
+    return hn::Max(hn::Load(d, p[corner[0]]), hn::Max(hn::Load(d, p[corner[1]]), hn::Load(d, p[corner[2]])));
+  };
+  const Vec low = least(v.column), high = most(v.column);
+  const float column_pad = pad * rows.scale + kSlack, row_pad = pad * rows.row_scale + kSlack;
+  const Vec first_row = hn::Add(least(v.row), hn::Set(d, rows.least_row_offset - row_pad)),
+            last_row = hn::Add(most(v.row), hn::Set(d, rows.most_row_offset + row_pad));
+  UintVec columns[SampleRows::kMaxColumns / SampleRows::kWord];
+  for (std::uint32_t word = 0; word * SampleRows::kWord < rows.columns; ++word) {
+    const float from = static_cast<float>(word * SampleRows::kWord);
+    columns[word] = ColumnsBetween(low, high, hn::Set(d, rows.least_offset - from - column_pad + 0.5f),
+                                   hn::Set(d, 31.5f - rows.most_offset + from - column_pad));
+  }
+  LaneMask receivers = hn::Lt(low, low);
+  range.for_open_lines(rows, packet, [&](std::uint32_t line) HWY_ATTR {
+    const Vec row = hn::Set(d, static_cast<float>(line % rows.rows));
+    const UintVec open = hn::And(hn::Load(du, packet.open[line]), columns[line / rows.rows]);
+    const LaneMask here = hn::And(hn::RebindMask(d, hn::Ne(open, hn::Zero(du))),
+                                  hn::And(hn::Le(first_row, row), hn::Ge(last_row, row)));
+    if (!hn::AllFalse(d, here)) lines.add(line);
+    receivers = hn::Or(receivers, here);
+    return false;
+  });
+  return receivers;
 }
 
 /// A half plane of the picture in each lane: column x of row y is inside beyond p + q y, towards larger x where `up`.
@@ -267,26 +364,6 @@ struct Limits {
 };
 constexpr Limits kLimits[8] = {{{0, 0}, {0, 0}}, {{0, 0}, {1, 2}}, {{1, 1}, {0, 2}}, {{0, 1}, {2, 2}},
                                {{2, 2}, {0, 1}}, {{0, 2}, {1, 1}}, {{1, 2}, {0, 0}}, {{0, 0}, {0, 0}}};
-
-/// Bits of the columns between low and high, rounded to whole ones within HalfPlane's slack.
-HWY_INLINE UintVec ColumnsBetween(Vec low, Vec high, Vec offset, Vec rest) {
-  const Tag d;
-  const UintTag du;
-  // A float of 2^23 and more is a whole number, which stands in its lowest bits.
-  const Vec shifter = hn::Set(d, 0x1p23f), zero = hn::Zero(d);
-  const UintVec shifter_bits = hn::Set(du, 0x4b000000u), ones = hn::Set(du, ~0u);
-  const Vec from = hn::Add(hn::Max(hn::Add(low, offset), zero), shifter);  // columns left out at the start
-  const Vec past = hn::Add(hn::Max(hn::Sub(rest, high), zero), shifter);   // and at the end
-  const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits), last = hn::Sub(hn::BitCast(du, past), shifter_bits);
-#if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86  // shifts by 32 and more leave nothing
-  return hn::And(hn::Shl(ones, first), hn::Shr(ones, last));
-#else
-  const UintVec most = hn::Set(du, 31u);
-  const auto some = hn::And(hn::RebindMask(du, hn::Lt(from, hn::Set(d, 0x1p23f + 32.0f))),
-                            hn::RebindMask(du, hn::Lt(past, hn::Set(d, 0x1p23f + 32.0f))));
-  return hn::IfThenElseZero(some, hn::And(hn::Shl(ones, hn::And(first, most)), hn::Shr(ones, hn::And(last, most))));
-#endif
-}
 
 /// The picture of a triangle, line by line.
 ///
@@ -377,13 +454,13 @@ class PacketSolver {
   bool Begin(std::size_t first, std::size_t count);
   bool FindOpenPart();
   bool RasterizeLeaf(const BlockerTree::Leaf& leaf);
-  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, const PictureRange& range, bool above,
-                         bool below);
+  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, const PacketView& view,
+                         std::size_t view_lane, const PictureRange& range);
   void StoreMasks();
 
   HWY_INLINE void SetPlanes(const BlockerTree::Leaf& leaf, std::size_t lane, PacketTriangle& triangle) const;
-  HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range);
-  HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const PictureRange& range, LaneMask below, LaneMask active);
+  HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const LineSet& lines);
+  HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const LineSet& lines, LaneMask below, LaneMask active);
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
   void Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible, std::uint32_t* inside);
 
@@ -398,7 +475,8 @@ class PacketSolver {
   ExactScratch& scratch_;
   KernelCounters& counters_;
   Packet packet_;
-  std::uint64_t changed_lines_[kMaxLines / 64];
+  LineSet changed_lines_;
+  ProjectedVertices vertices_;                    // of the leaf at work
   std::optional<TexelLookup> texels_[kMaxLanes];  // of the perforated triangle at work, made when first needed
 };
 
@@ -420,6 +498,10 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
                       hn::LoadU(d, &receivers_.z[first])};
   packet_.own = hn::LoadU(du, &receivers_.own[first]);
   packet_.to_center = Subtract(Splat(scene_.samples->center), packet_.position);
+  const Vec3 from_center = Subtract(packet_.position, Splat(scene_.samples->center));
+  packet_.column = Dot(from_center, Splat(rows_.axis_x * rows_.scale));
+  packet_.row = Dot(from_center, Splat(rows_.axis_y * rows_.row_scale));
+  packet_.height = Dot(from_center, Splat(vec3(scene_.frame.n)));
   packet_.distance =
       hn::Add(NormMax(packet_.to_center), hn::Set(d, scene_.samples->reach + rows_.deviation / kDeterminantError));
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));
@@ -429,7 +511,7 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   }
   scratch_.lines.place(*scene_.rows, receivers_.set.data() + first, count);
   packet_.lines = &scratch_.lines;
-  std::fill(std::begin(changed_lines_), std::end(changed_lines_), ~std::uint64_t{0});
+  for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
   return FindOpenPart();
 }
 
@@ -437,7 +519,7 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
 bool PacketSolver::FindOpenPart() {
   std::uint32_t columns[2] = {0, 0}, first = ~0u, last = 0;
   for (std::uint32_t line = 0; line < rows_.lines; ++line) {
-    if ((changed_lines_[line / 64] >> (line % 64)) & 1) {
+    if (changed_lines_.has(line)) {
       std::uint32_t all = 0;
       for (std::size_t k = 0; k < hn::Lanes(Tag()); ++k) all |= packet_.open[line][k];
       packet_.any_open[line] = all;
@@ -446,7 +528,7 @@ bool PacketSolver::FindOpenPart() {
     columns[line / rows_.rows] |= packet_.any_open[line];
     first = std::min(first, line % rows_.rows), last = std::max(last, line % rows_.rows);
   }
-  std::fill(std::begin(changed_lines_), std::end(changed_lines_), 0);
+  changed_lines_ = LineSet();
   const std::uint64_t all = columns[0] | std::uint64_t{columns[1]} << 32;
   if (all == 0) return false;
   const float pad = ProjectionPad(packet_.shaft.low[2]) + rows_.deviation;
@@ -466,11 +548,16 @@ bool PacketSolver::RasterizeLeaf(const BlockerTree::Leaf& leaf) {
     const PacketView view = ViewTriangles(scene_, leaf, i, packet_);
     if (view.active == 0) continue;
     PictureRanges ranges;
-    for (std::uint64_t rest = LanesOverOpenSamples(rows_, view.on_light, view.active, packet_, ranges); rest != 0;
-         rest &= rest - 1) {
+    const std::uint64_t kept = LanesOverOpenSamples(rows_, view.on_light, view.active, packet_, ranges);
+    std::uint64_t vertices = 0;
+    for (std::uint64_t rest = kept & view.bounded; rest != 0; rest &= rest - 1) {
+      const std::size_t lane = i + static_cast<std::size_t>(std::countr_zero(rest));
+      for (const auto& vertex : leaf.corner_vertex) vertices |= std::uint64_t{1} << vertex[lane];
+    }
+    ProjectVertices(scene_, leaf, vertices, packet_, vertices_);
+    for (std::uint64_t rest = kept; rest != 0; rest &= rest - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-      added |= RasterizeTriangle(leaf, i + lane, PictureRange(rows_, ranges, lane), (view.above >> lane) & 1,
-                                 (view.below >> lane) & 1);
+      added |= RasterizeTriangle(leaf, i + lane, view, lane, PictureRange(rows_, ranges, lane));
     }
   }
   return added;
@@ -509,8 +596,7 @@ HWY_INLINE std::array<LaneMask, 4> PacketSolver::Orient(const PacketTriangle& tr
 
 /// The lanes whose receiver lies above the plane, along the normal ("the plane is below it"). Takes those for which the
 /// triangle hides nothing out of `active`.
-HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, LaneMask& active,
-                                            const PictureRange& range) {
+HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, LaneMask& active, const LineSet& lines) {
   const Tag d;
   const Blocker& b = *triangle.blocker;
   const Vec3 to_corner = Subtract(Splat(triangle.corner[0]), packet_.position);
@@ -525,14 +611,13 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
     for (const LaneMask turned : {none, hn::Not(none)}) {
       const std::array<LaneMask, 4> up = Orient(triangle, turned);
       const Outline outline(triangle, up, Bits(unknown));
-      range.for_open_lines(rows_, packet_, [&](std::uint32_t line) HWY_ATTR {
+      lines.for_each([&](std::uint32_t line) HWY_ATTR {
         const UintTag du;
         const PictureLines& l = *packet_.lines;
         const UintVec possible =
             hn::And(outline.possible(hn::Load(d, l.y[line]), hn::Load(d, l.offset[line]), hn::Load(d, l.rest[line])),
                     hn::Load(du, packet_.open[line]));
         matters = hn::Or(matters, hn::RebindMask(d, hn::Ne(possible, hn::Zero(du))));
-        return false;
       });
     }
     for (std::uint64_t rest = Bits(hn::And(unknown, matters)); rest != 0; rest &= rest - 1) {
@@ -570,7 +655,7 @@ void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, co
   }
 }
 
-HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const PictureRange& range, LaneMask below,
+HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const LineSet& lines, LaneMask below,
                                         LaneMask active) {
   const Tag d;
   const UintTag du;
@@ -578,36 +663,47 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
   const Outline outline(triangle, up, Bits(active));
   const auto wanted = hn::VecFromMask(du, hn::RebindMask(du, active));
   bool added = false;
-  range.for_open_lines(rows_, packet_, [&](std::uint32_t line) HWY_ATTR {
+  lines.for_each([&](std::uint32_t line) HWY_ATTR {
     const PictureLines& l = *packet_.lines;
     const Vec y = hn::Load(d, l.y[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
     const UintVec open = hn::Load(du, packet_.open[line]), asked = hn::And(open, wanted);
     const UintVec possible = hn::And(asked, outline.possible(y, offset, rest));
     ++counters_.sample_tests;
-    if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return false;
+    if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return;
     UintVec inside = hn::And(asked, outline.inside(y, offset, rest));
     if (triangle.perforated || !hn::AllTrue(du, hn::Eq(possible, inside))) {
       alignas(HWY_MAX_BYTES) std::uint32_t may[kMaxLanes], does[kMaxLanes];
       hn::Store(possible, du, may), hn::Store(inside, du, does);
       Settle(triangle, line, may, does);
       inside = hn::Load(du, does);
-      if (hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)))) return false;
+      if (hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)))) return;
     }
     hn::Store(hn::AndNot(inside, open), du, packet_.open[line]);
-    changed_lines_[line / 64] |= std::uint64_t{1} << (line % 64);
+    changed_lines_.add(line);
     added = true;
-    return false;
   });
   return added;
 }
 
 /// One triangle into all pictures; true where samples were blocked.
-bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, const PictureRange& range,
-                                     bool above, bool below) {
+bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, const PacketView& view,
+                                     std::size_t view_lane, const PictureRange& range) {
   const Tag d;
   const UintTag du;
-  LaneMask active =
-      hn::And(hn::FirstN(d, packet_.count), hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
+  LaneMask active = hn::And(hn::FirstN(d, packet_.count),
+                            hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
+  LineSet lines;
+  if ((view.bounded >> view_lane) & 1) {
+    const std::array<std::uint8_t, 3> corner = {leaf.corner_vertex[0][lane], leaf.corner_vertex[1][lane],
+                                                leaf.corner_vertex[2][lane]};
+    active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[view_lane], vertices_, range, packet_,
+                                                      lines));
+  } else {
+    range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
+      lines.add(line);
+      return false;
+    });
+  }
   if (hn::AllFalse(d, active)) return false;
   PacketTriangle triangle;
   triangle.blocker = &scene_.tree->blockers[leaf.first + lane];
@@ -617,14 +713,15 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t 
     triangle.corner[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
   }
   SetPlanes(leaf, lane, triangle);
+  const bool above = (view.above >> view_lane) & 1, below = (view.below >> view_lane) & 1;
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
   LaneMask is_below = below ? hn::Not(none) : none;
   if (!above && !below) {
-    is_below = FindBelow(triangle, active, range);
+    is_below = FindBelow(triangle, active, lines);
     if (hn::AllFalse(d, active)) return false;
   }
   ++counters_.pairs_sampled;
-  if (!Rasterize(triangle, range, is_below, active)) return false;
+  if (!Rasterize(triangle, lines, is_below, active)) return false;
   ++counters_.pairs_necessary;
   return true;
 }
