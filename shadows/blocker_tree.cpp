@@ -211,6 +211,10 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
   flatten(*build(items, 0), tree);
   tree.order.reserve(items.size());
   for (const Item& item : items) tree.order.push_back(item.triangle);
+  place_blockers(mesh, tree);
+}
+
+void place_blockers(const LatticeMesh& mesh, BlockerTree& tree) {
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) fill_lanes(mesh, tree, tree.leaves[i]);
   });

@@ -63,6 +63,10 @@ struct BlockerTree {
 /// Order, leaves and topology by binned surface area heuristic. Equal bits for any number of threads.
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);
 
+/// What the leaves hold of the mesh that does not depend on a light, anew: for a mesh that moved since the tree was
+/// built.
+void place_blockers(const LatticeMesh& mesh, BlockerTree& tree);
+
 /// Blockers and bounds for a light.
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
                         BlockerTree& tree);
