@@ -1,6 +1,7 @@
 #include "shadows/blocker_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "rasterizer/core/parallel.h"
@@ -252,11 +253,15 @@ void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, c
     }
   });
   std::size_t perforated = 0;
-  for (const Blocker& b : tree.blockers) perforated += b.perforated;
+  for (const BlockerTree::Leaf& leaf : tree.leaves)
+    perforated += static_cast<std::size_t>(std::popcount(leaf.perforated));
   tree.alpha.clear();
   tree.alpha.reserve(perforated);  // blockers point into it
-  for (Blocker& b : tree.blockers) {
-    if (b.perforated) b.alpha = &tree.alpha.emplace_back(make_alpha_triangle(mesh, b.triangle));
+  for (const BlockerTree::Leaf& leaf : tree.leaves) {
+    for (std::uint32_t rest = leaf.perforated; rest != 0; rest &= rest - 1) {
+      Blocker& b = tree.blockers[leaf.first + static_cast<std::uint32_t>(std::countr_zero(rest))];
+      b.alpha = &tree.alpha.emplace_back(make_alpha_triangle(mesh, b.triangle));
+    }
   }
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     BlockerTree::Node& node = tree.nodes[n];

@@ -31,9 +31,9 @@ struct BlockerTree {
   };
   /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
   struct alignas(64) Leaf {
-    float corner[3][3][kWidth];             // [corner][axis][lane]
-    float vertex[3][3 * kWidth];            // [axis][vertex]: the corners again, equal ones once
-    std::uint8_t corner_vertex[3][kWidth];  // [corner][lane] -> vertex
+    float corner[3][3][kWidth];               // [corner][axis][lane]
+    float vertex[3][3 * kWidth];              // [axis][vertex]: the corners again, equal ones once
+    std::uint8_t corner_vertex[3][kWidth];    // [corner][lane] -> vertex
     std::uint8_t edge_vertex[2][3 * kWidth];  // [end][edge] -> vertex; edges between equal vertices once
     std::uint8_t corner_edge[3][kWidth];      // [corner][lane] -> edge from there to the next; kReversed where it runs
                                               // against the edge's own direction

@@ -28,15 +28,15 @@ constexpr std::size_t kMaxLines = SampleRows::kMaxLines;
 /// Receivers [first, first + count), a lane each; lanes beyond repeat the last one and have nothing open.
 struct Packet {
   std::size_t first = 0, count = 0;
-  Vec3 position, to_center;           // lattice; from there to the light's centre
-  Vec distance;                       // bound on |coordinate| of receiver to sample
+  Vec3 position, to_center;       // lattice; from there to the light's centre
+  Vec distance;                   // bound on |coordinate| of receiver to sample
   Vec height_error, place_error;  // 5 |r - c| / height + 10; 5 |r - c|: see ProjectVertices
-  Vec column, row, height;  // of the receivers over the picture, in columns and rows from its centre; in lengths
-  UintVec own;                        // own triangle
-  vec3 low, high;                     // box around the receivers, lattice
-  Shaft shaft;                        // the same in the light's frame, and a rectangle around what is open of the light
-  const PictureLines* lines;          // where the rows lie
-  std::uint32_t any_open[kMaxLines];  // what some receiver has open
+  Vec column, row, height;        // of the receivers over the picture, in columns and rows from its centre; in lengths
+  UintVec own;                    // own triangle
+  vec3 low, high;                 // box around the receivers, lattice
+  Shaft shaft;                    // the same in the light's frame, and a rectangle around what is open of the light
+  const PictureLines* lines;      // where the rows lie
+  std::uint32_t any_open[kMaxLines];                                // what some receiver has open
   alignas(HWY_MAX_BYTES) std::uint32_t open[kMaxLines][kMaxLanes];  // bit i: sample i of the line is not blocked yet
 };
 
@@ -96,7 +96,8 @@ struct PictureRange {
   }
 };
 
-/// Of the lanes in `active` (lane i of the ranges is the first), those whose rectangle may hold a sample that some receiver has open.
+/// Of the lanes in `active` (lane i of the ranges is the first), those whose rectangle may hold a sample that some
+/// receiver has open.
 HWY_INLINE std::uint64_t LanesOverOpenSamples(const SampleRows& rows, const LaneRectangles& q, std::uint64_t active,
                                               const Packet& packet, std::size_t i, const PictureRanges& ranges) {
   const Tag d;
@@ -220,7 +221,8 @@ HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& 
   if (active == 0) return;
   LaneRectangles q;
   Vec pad;
-  view.bounded |= static_cast<std::uint32_t>(Bits(ProjectOntoLight(scene.frame, to_corner, middle, packet.shaft, q, pad))) << i;
+  view.bounded |=
+      static_cast<std::uint32_t>(Bits(ProjectOntoLight(scene.frame, to_corner, middle, packet.shaft, q, pad))) << i;
   hn::StoreU(pad, d, view.pad + i);
   FindRanges(*scene.rows, q, i, view.ranges);
   view.kept |= static_cast<std::uint32_t>(LanesOverOpenSamples(*scene.rows, q, active, packet, i, view.ranges)) << i;
@@ -263,7 +265,8 @@ HWY_INLINE UintVec ColumnsBetween(Vec low, Vec high, Vec offset, Vec rest) {
   const UintVec shifter_bits = hn::Set(du, 0x4b000000u), ones = hn::Set(du, ~0u);
   const Vec from = hn::Add(hn::Max(hn::Add(low, offset), zero), shifter);  // columns left out at the start
   const Vec past = hn::Add(hn::Max(hn::Sub(rest, high), zero), shifter);   // and at the end
-  const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits), last = hn::Sub(hn::BitCast(du, past), shifter_bits);
+  const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits),
+                last = hn::Sub(hn::BitCast(du, past), shifter_bits);
 #if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86  // shifts by 32 and more leave nothing
   return hn::And(hn::Shl(ones, first), hn::Shr(ones, last));
 #else
@@ -316,8 +319,8 @@ HWY_INLINE LaneMask ReceiversOverOpenSamples(const SampleRows& rows, const std::
   range.for_open_lines(rows, packet, [&](std::uint32_t line) HWY_ATTR {
     const Vec row = hn::Set(d, static_cast<float>(line % rows.rows));
     const UintVec open = hn::And(hn::Load(du, packet.open[line]), columns[line / rows.rows]);
-    const LaneMask here = hn::And(hn::RebindMask(d, hn::Ne(open, hn::Zero(du))),
-                                  hn::And(hn::Le(first_row, row), hn::Ge(last_row, row)));
+    const LaneMask here =
+        hn::And(hn::RebindMask(d, hn::Ne(open, hn::Zero(du))), hn::And(hn::Le(first_row, row), hn::Ge(last_row, row)));
     if (!hn::AllFalse(d, here)) lines.add(line);
     receivers = hn::Or(receivers, here);
     return false;
@@ -353,8 +356,8 @@ HWY_INLINE HalfPlane SolveForX(const SampleRows& rows, Vec a, Vec b, Vec c, Vec 
   const Vec p = hn::Neg(hn::Mul(c, inverse));
   HalfPlane h;
   h.slope = hn::Neg(hn::Mul(b, inverse));
-  // p, q and p + q y are each within six units of 2^-24; columns are rounded at 2^-16 of one, and to whole ones by adding
-  // a half less that much.
+  // p, q and p + q y are each within six units of 2^-24; columns are rounded at 2^-16 of one, and to whole ones by
+  // adding a half less that much.
   const Vec rounding = hn::MulAdd(hn::Abs(h.slope), hn::Set(d, rows.reach_y), hn::Abs(p));
   const Vec slack = hn::MulAdd(rounding, hn::Set(d, 0x1p-20f), hn::Set(d, 0x1p-15f));
   const Vec width = hn::MulAdd(hn::Mul(error, hn::Set(d, 1.0f + 0x1p-20f)), hn::Abs(inverse), slack);
@@ -407,7 +410,8 @@ class Outline {
     if (!simple_) return all_limits(y, offset, rest, true);
     const auto at = [&](Vec p, Vec q) { return hn::MulAdd(q, y, p); };
     return ColumnsBetween(hn::Max(at(low_[0]->least, low_[0]->slope), at(low_[1]->least, low_[1]->slope)),
-                          hn::Min(at(high_[0]->most, high_[0]->slope), at(high_[1]->most, high_[1]->slope)), offset, rest);
+                          hn::Min(at(high_[0]->most, high_[0]->slope), at(high_[1]->most, high_[1]->slope)), offset,
+                          rest);
   }
 
   /// Samples that are certainly inside.
@@ -649,15 +653,16 @@ std::uint32_t PacketSolver::FindPatch(const BlockerTree::Leaf& leaf) {
   return patch;
 }
 
-/// Vertices of the outline, and its edges as the receivers see them. Returns the receivers for which no vertex lies on a
-/// row, so far as can be told.
+/// Vertices of the outline, and its edges as the receivers see them. Returns the receivers for which no vertex lies on
+/// a row, so far as can be told.
 HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std::uint64_t projected) {
   const Tag d;
   std::uint64_t used = 0;
   for (std::uint32_t e = 0; e < outline_.count; ++e) used |= std::uint64_t{1} << outline_.from[e];
   ProjectVertices(scene_, leaf, used & ~projected, packet_, vertices_);
   const Vec row_offset = hn::Set(d, 0.5f * (rows_.least_row_offset + rows_.most_row_offset));
-  const Vec spread = hn::Set(d, rows_.most_row_offset - rows_.least_row_offset + rows_.deviation * rows_.row_scale + 1e-5f);
+  const Vec spread =
+      hn::Set(d, rows_.most_row_offset - rows_.least_row_offset + rows_.deviation * rows_.row_scale + 1e-5f);
   const Vec row_scale = hn::Set(d, rows_.row_scale), end = hn::Set(d, static_cast<float>(rows_.rows));
   LaneMask on_row = hn::Lt(end, end);
   for (std::uint64_t rest = used; rest != 0; rest &= rest - 1) {
@@ -673,8 +678,8 @@ HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std:
     const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
               dx = hn::Sub(hn::Load(d, vertices_.column[b]), xa), dy = hn::Sub(hn::Load(d, vertices_.row[b]), ya);
     const Vec slope = hn::Div(dx, hn::IfThenElse(hn::Eq(dy, hn::Zero(d)), hn::Set(d, 1.0f), dy));
-    const Vec error = hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])),
-                              hn::Set(d, rows_.deviation));
+    const Vec error =
+        hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])), hn::Set(d, rows_.deviation));
     Vec width = hn::Mul(error, hn::MulAdd(hn::Abs(slope), row_scale, hn::Set(d, rows_.scale)));
     width = hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(dx)), hn::Set(d, 0x1p-20f), width);
     width = hn::Add(width, hn::Set(d, 0x1p-16f));
@@ -683,7 +688,8 @@ HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std:
     // Edges to the right of the picture hide nothing of it.
     const Vec left = hn::Sub(hn::Min(xa, hn::Add(xa, dx)), width), yb = hn::Add(ya, dy);
     if (hn::AllTrue(d, hn::Gt(left, hn::Set(d, static_cast<float>(rows_.columns) - rows_.least_offset)))) continue;
-    const float low = hn::GetLane(hn::MinOfLanes(d, hn::Min(ya, yb))), high = hn::GetLane(hn::MaxOfLanes(d, hn::Max(ya, yb)));
+    const float low = hn::GetLane(hn::MinOfLanes(d, hn::Min(ya, yb))),
+                high = hn::GetLane(hn::MaxOfLanes(d, hn::Max(ya, yb)));
     const auto first = static_cast<std::int32_t>(std::max(low + rows_.least_row_offset - 1e-3f, 0.0f));
     const float last = std::min(high + rows_.most_row_offset + 1e-3f, static_cast<float>(rows_.rows) - 1.0f);
     for (std::int32_t row = first; static_cast<float>(row) <= last; ++row) outline_.on_row[row] |= 1u << e;
@@ -731,14 +737,16 @@ HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful)
     const Vec off = hn::Abs(hn::Sub(place, hn::Sub(from, shifter)));  // a half where x is a column
     const LaneMask unsure = hn::And(crossing, hn::Ge(off, hn::Sub(half, width)));
     if (!hn::AllFalse(d, unsure)) {
-      doubtful = hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure),
-                                                     ColumnsBetween(hn::Sub(x, width), hn::Add(x, width), offset, rest)));
+      doubtful =
+          hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure),
+                                              ColumnsBetween(hn::Sub(x, width), hn::Add(x, width), offset, rest)));
     }
     const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits);
 #if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
     const UintVec beyond = hn::Shl(ones, first);
 #else
-    const UintVec beyond = hn::IfThenElseZero(hn::Lt(first, hn::Set(du, 32u)), hn::Shl(ones, hn::And(first, hn::Set(du, 31u))));
+    const UintVec beyond =
+        hn::IfThenElseZero(hn::Lt(first, hn::Set(du, 32u)), hn::Shl(ones, hn::And(first, hn::Set(du, 31u))));
 #endif
     const LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
     if (!hn::AllFalse(d, down)) winding.Add(hn::IfThenElseZero(hn::RebindMask(du, down), beyond));
@@ -943,8 +951,8 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t 
   if ((view_.bounded >> lane) & 1) {
     const std::array<std::uint8_t, 3> corner = {leaf.corner_vertex[0][lane], leaf.corner_vertex[1][lane],
                                                 leaf.corner_vertex[2][lane]};
-    active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view_.pad[lane], vertices_, range, packet_,
-                                                      lines));
+    active =
+        hn::And(active, ReceiversOverOpenSamples(rows_, corner, view_.pad[lane], vertices_, range, packet_, lines));
   } else {
     range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
       lines.add(line);
@@ -1007,7 +1015,8 @@ void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::s
   for (std::uint32_t line = 0; line < rows.lines; ++line) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const std::size_t at = std::size_t{set[std::min(lane, count - 1)]} * rows.lines + line;
-      y[line][lane] = rows.y[at], offset[line][lane] = rows.offset[at] + 0.5f, rest[line][lane] = 31.5f - rows.offset[at];
+      y[line][lane] = rows.y[at], offset[line][lane] = rows.offset[at] + 0.5f,
+      rest[line][lane] = 31.5f - rows.offset[at];
     }
   }
   placed = alike ? set[0] : kMixed;
