@@ -92,8 +92,8 @@ MeshCertificate make_certificate(const StoredMesh& mesh, std::span<const vec3> p
   alone.positions.assign(positions.begin(), positions.end());
   alone.triangles = mesh.triangles;
   MeshCertificate result;
-  const std::vector<std::uint32_t> number = weld(alone.positions);
-  ClosedComponents closed = find_closed_components(alone);
+  std::vector<std::uint32_t> number;
+  ClosedComponents closed = find_closed_components(alone, nullptr, &number);
   result.of_triangle = std::move(closed.of_triangle);
   result.parts = static_cast<std::uint32_t>(closed.boxes.size());
   std::vector<std::uint32_t> first(number.size(), kNone);  // [number] -> a vertex that has it
