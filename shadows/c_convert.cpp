@@ -44,7 +44,7 @@ void read_emission_image(const halfshade_light& given, const std::string& name, 
   if (given.image_width == 0 || given.image_height == 0) usage(name + ".emission_image has no width or no height");
   const std::uint64_t texels = std::uint64_t{given.image_width} * given.image_height;
   if (texels > kMostInC) throw Error(ErrorCode::kLimit, name + ".emission_image has more than 2^31 - 1 texels");
-  check_array(given.emission_image, texels, 0, sizeof(vec3), alignof(float), name + ".emission_image");
+  check_array(given.emission_image, texels, 0, sizeof(vec3), 1, name + ".emission_image");
   image.width = given.image_width;
   image.height = given.image_height;
   image.rgb.resize(texels);
@@ -106,18 +106,17 @@ PointView to_view(const halfshade_points& points, const std::string& name) {
 }
 
 IndexView to_view(const halfshade_indices& indices, const std::string& name) {
-  check_array(indices.data, indices.count, indices.stride_bytes, sizeof(std::uint32_t), alignof(std::uint32_t), name);
+  check_array(indices.data, indices.count, indices.stride_bytes, sizeof(std::uint32_t), 1, name);
   return {indices.data, indices.count, indices.stride_bytes};
 }
 
 TriangleView to_triangles(const halfshade_indices& triangles, const std::string& name) {
-  check_array(triangles.data, triangles.count, triangles.stride_bytes, 3 * sizeof(std::uint32_t),
-              alignof(std::uint32_t), name);
+  check_array(triangles.data, triangles.count, triangles.stride_bytes, 3 * sizeof(std::uint32_t), 1, name);
   return {triangles.data, triangles.count, triangles.stride_bytes};
 }
 
 UvView to_view(const halfshade_uvs& uvs, const std::string& name) {
-  check_array(uvs.data, uvs.count, uvs.stride_bytes, 2 * sizeof(float), alignof(float), name);
+  check_array(uvs.data, uvs.count, uvs.stride_bytes, 2 * sizeof(float), 1, name);
   return {uvs.data, uvs.count, uvs.stride_bytes};
 }
 
