@@ -17,7 +17,7 @@ namespace py = pybind11;
 /// as it is. Python is asked at most every 20 ms: its lock may be held by others.
 inline Execution execution_of(const py::object& progress, bool serial) {
   using Clock = std::chrono::steady_clock;
-  constexpr auto kPause = std::chrono::milliseconds(20);
+  static constexpr auto kPause = std::chrono::milliseconds(20);
   Execution execution;
   execution.executor = serial ? Executor::kSerial : Executor::kArena;
   execution.progress = [progress = progress.ptr(), last = Clock::now()](double done) mutable {

@@ -200,7 +200,7 @@ PyGBuffer rasterized(PyScene& scene, std::uint32_t width, std::uint32_t height, 
 
 py::array_t<double> reach_of(const PyScene& scene) {
   const std::array<dvec3, 2> box = scene.value.reach();
-  return {std::vector<py::ssize_t>{2, 3}, &box[0].x};
+  return py::array_t<double>(std::vector<py::ssize_t>{2, 3}, &box[0].x);
 }
 
 void bind_scenes(py::module_& m) {
