@@ -133,7 +133,7 @@ static void meshes_move_and_go(void) {
   const double moved[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
   double aside[12];
   memcpy(aside, moved, sizeof aside);
-  aside[3] = -16; /* the edge is at x = -16 then */
+  aside[3] = -8; /* the edge is at x = -8 then */
   CHECK_OK(halfshade_scene_set_transform(f.context, f.scene, f.mesh, aside));
   CHECK_FAILS(solve(&f), HALFSHADE_ERROR_USAGE, "commit");
   CHECK_OK(halfshade_scene_commit(f.context, f.scene));
