@@ -81,6 +81,20 @@ SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame&
   return r;
 }
 
+/// The lists of all scratches may become as long as the longest that any had: which cluster meets which scratch changes
+/// with the receivers.
+void even_out(std::vector<ExactScratch>& scratches) {
+  std::size_t leaves = 0, nodes = 0;
+  for (const ExactScratch& s : scratches) {
+    leaves = std::max({leaves, s.leaf.capacity(), s.low[0].capacity(), s.keys.capacity()});
+    nodes = std::max(nodes, s.stack.capacity());
+  }
+  for (ExactScratch& s : scratches) {
+    s.stack.reserve(nodes), s.leaf.reserve(leaves), s.keys.reserve(leaves);
+    for (int k = 0; k < 3; ++k) s.low[k].reserve(leaves), s.high[k].reserve(leaves);
+  }
+}
+
 void clear_counters(ExactScratch& scratch) {
   scratch.counters = {};
   scratch.leaves_listed = scratch.leaves_tested = scratch.clusters_lit = 0;
@@ -107,7 +121,6 @@ void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, const
     side.tree_version = blockers.tree_version;
   }
   refit_blocker_tree(blockers.mesh, samples, frame, side.tree);
-  side.rectangles = make_rectangles(samples, frame);
   side.usable = samples.closed_usable;
   side.fitted = true;
 }
@@ -127,12 +140,13 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const SampleRows& rows = kept.rows;
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
-  const ExactScene scene{&side.tree, &samples, &side.rectangles, &rows, frame};
+  const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
   const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch>& scratches = work.scratches;
   scratches.resize(kTasksPerRound);
+  even_out(scratches);
   for (ExactScratch& scratch : scratches) clear_counters(scratch);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
@@ -173,6 +187,14 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 }  // namespace
 
+void ExactWork::reserve(std::size_t count, std::size_t words) {
+  const std::size_t padded = count + KernelReceivers::kLanePadding;
+  morton.keys.reserve(count), morton.scratch.reserve(count), order.reserve(count);
+  receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
+  receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
+  receivers.masks.reserve(count * words);
+}
+
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {
   kept.unfit();
   const LightBound bound = make_light_bound(light, samples);
@@ -180,6 +202,7 @@ void prepare_exact_light(const Light& light, const LightSamples& samples, ExactL
   kept.samples = make_kernel_samples(samples, bound, SampleOrder::kAsGiven);
   kept.rows = find_sample_rows(samples, kept.samples, kept.front);
   if (kept.rows.empty()) kept.samples = make_kernel_samples(samples, bound);
+  kept.rectangles = make_rectangles(kept.samples, kept.front);
 }
 
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,

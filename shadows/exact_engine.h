@@ -23,8 +23,7 @@ struct ExactBlockers {
 /// One side of a light and the blockers as it sees them.
 struct ExactSide {
   BlockerTree tree;
-  SampleRectangles rectangles;
-  bool fitted = false;               // both belong to the light's samples and to the blockers
+  bool fitted = false;               // the tree belongs to the light's samples and to the blockers
   std::vector<std::uint8_t> usable;  // the certificates that the tree was fitted with
   std::uint64_t tree_version = 0;    // whose order the tree has; 0 = none
 };
@@ -33,7 +32,8 @@ struct ExactSide {
 struct ExactLight {
   LightFrame front;
   KernelSamples samples;
-  SampleRows rows;  // empty: samples anywhere
+  SampleRows rows;              // empty: samples anywhere
+  SampleRectangles rectangles;  // the same from both sides
   std::array<ExactSide, 2> sides;
 
   /// The blockers moved.
@@ -51,13 +51,16 @@ struct ExactWork {
   std::vector<std::uint32_t> order;
   KernelReceivers receivers;
   std::vector<ExactScratch> scratches;
+
+  /// Room for so many receivers with masks of so many words.
+  void reserve(std::size_t count, std::size_t words);
 };
 
 /// For flat lights.
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept);
 
-/// Masks of all receivers, exact, by a light that was prepared. Allocates nothing that an earlier call with as many
-/// receivers and the same blockers did not need, unless receivers lie in the light's plane.
+/// Masks of all receivers, exact, by a light that was prepared. Allocates nothing where `work` has room for the
+/// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane.
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, ExactLight& kept, ExactWork& work,
                  VisibilityMasks& masks, ShadowStats& stats);

@@ -58,21 +58,6 @@ void check_output(const Call& call, std::size_t receivers, bool has_normals) {
   }
 }
 
-void check_lights(const Call& call) {
-  for (std::size_t i = 0; i < call.lights.size(); ++i) {
-    const Light& light = call.lights[i];
-    check_light(light, call.config);
-    for (const dvec3& p : light_box(light)) {
-      if (in_reach(call.scene.mesh.frame, p)) continue;
-      throw Error(ErrorCode::kBadInput, "light " + std::to_string(i) + " '" + light.name +
-                                            "' is outside the scene's reach; ShadowScene::extend widens it");
-    }
-    if (light.emission_image.empty() || light.shape == LightShape::kRectangle) continue;
-    throw Error(ErrorCode::kBadInput,
-                "light " + std::to_string(i) + " '" + light.name + "': only rectangles have emission images");
-  }
-}
-
 bool same_geometry(const Light& a, const Light& b) {
   return a.shape == b.shape && a.center == b.center && a.u == b.u && a.v == b.v && a.normal == b.normal &&
          a.radius == b.radius && a.points == b.points && a.two_sided == b.two_sided && a.axes == b.axes;
@@ -87,23 +72,50 @@ bool same_image(const EmissionImage& a, const EmissionImage& b) {
   return a.width == b.width && a.height == b.height && a.rgb == b.rgb;
 }
 
+KeptLight& place_of(const Call& call, std::size_t index) {
+  return call.workspace.lights[index % call.workspace.lights.size()];
+}
+
+SampleKey key_of(const Call& call) {
+  const ShadowConfig& c = call.config;
+  return {c.pattern,  c.light_sample_count, c.sample_sets, c.seed,
+          call.frame, c.interleave,         c.rotate_sets, call.scene.mesh.frame};
+}
+
+/// Are the samples of light `index` there from an earlier call?
+bool is_kept(const Call& call, std::size_t index) {
+  const KeptLight& kept = place_of(call, index);
+  return kept.filled && kept.key == key_of(call) && same_geometry(kept.light, call.lights[index]);
+}
+
+void check_lights(const Call& call) {
+  for (std::size_t i = 0; i < call.lights.size(); ++i) {
+    const Light& light = call.lights[i];
+    if (!is_kept(call, i)) check_light(light, call.config);
+    for (const dvec3& p : light_box(light)) {
+      if (in_reach(call.scene.mesh.frame, p)) continue;
+      throw Error(ErrorCode::kBadInput, "light " + std::to_string(i) + " '" + light.name +
+                                            "' is outside the scene's reach; ShadowScene::extend widens it");
+    }
+    if (light.emission_image.empty() || light.shape == LightShape::kRectangle) continue;
+    throw Error(ErrorCode::kBadInput,
+                "light " + std::to_string(i) + " '" + light.name + "': only rectangles have emission images");
+  }
+}
+
 /// The samples of a light, from an earlier call where they are the same.
 KeptLight& keep_light(const Call& call, std::size_t index) {
-  KeptLight& kept = call.workspace.lights[index % call.workspace.lights.size()];
-  const Light& light = call.lights[index];
-  const ShadowConfig& c = call.config;
-  const SampleKey key{c.pattern,  c.light_sample_count, c.sample_sets, c.seed,
-                      call.frame, c.interleave,         c.rotate_sets, call.scene.mesh.frame};
-  const bool same = kept.filled && kept.key == key && same_geometry(kept.light, light);
+  KeptLight& kept = place_of(call, index);
+  const bool same = is_kept(call, index);
   if (!same) {
     kept.filled = kept.prepared = false;
-    ShadowConfig config = c;
+    ShadowConfig config = call.config;
     config.frame = call.frame;
-    kept.samples = make_light_samples(light, config, call.scene.mesh.frame);
+    kept.samples = make_light_samples(call.lights[index], config, call.scene.mesh.frame);
     kept.weights.clear();
     kept.image.rgb.clear();
-    kept.key = key;
-    copy_geometry(light, kept.light);
+    kept.key = key_of(call);
+    copy_geometry(call.lights[index], kept.light);
     kept.filled = true;
   }
   ++(same ? call.workspace.stats.lights_kept : call.workspace.stats.lights_made);
@@ -146,6 +158,9 @@ void solve_exact_kept(const Call& call, const Light& light, KeptLight& kept, Sha
   if (kept.scene_version != scene.version) kept.exact.unfit();
   kept.scene = scene.identity, kept.scene_version = scene.version;
   stats.build_ms = watch.lap();
+  const std::size_t words = (kept.samples.count + 63) / 64;
+  w.exact.reserve(w.receivers.size(), words);
+  w.masks.words.reserve(w.receivers.size() * words);
   const ExactBlockers blockers{scene.mesh, scene.config.back_face_casters ? &scene.closed : nullptr, &scene.tree,
                                scene.tree_version};
   solve_exact(blockers, w.lit.array, light, kept.samples, call.config, kept.exact, w.exact, w.masks, stats);
