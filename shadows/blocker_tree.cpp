@@ -139,13 +139,25 @@ std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   return index;
 }
 
-void set_lane(const Blocker& b, std::uint32_t lane, BlockerTree::Leaf& leaf) {
+/// What does not depend on a light; lanes beyond the last repeat it.
+void set_lane(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t lane, BlockerTree::Leaf& leaf,
+              std::uint32_t& vertices) {
+  const std::array<vec3, 3> corner = mesh.corners(triangle);
   for (int k = 0; k < 3; ++k) {
-    for (int axis = 0; axis < 3; ++axis) leaf.corner[k][axis][lane] = b.corner[k][axis];
-    leaf.normal[k][lane] = b.normal[k];
+    std::uint32_t v = 0;
+    while (v < vertices && vec3(leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]) != corner[k]) ++v;
+    for (int axis = 0; axis < 3; ++axis) leaf.corner[k][axis][lane] = leaf.vertex[axis][v] = corner[k][axis];
+    leaf.corner_vertex[k][lane] = static_cast<std::uint8_t>(v);
+    vertices = std::max(vertices, v + 1);
   }
-  leaf.side_error[lane] = b.side_error;
-  leaf.triangle[lane] = b.triangle;
+  leaf.triangle[lane] = triangle;
+}
+
+void fill_lanes(const LatticeMesh& mesh, const BlockerTree& tree, BlockerTree::Leaf& leaf) {
+  std::uint32_t vertices = 0;
+  for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+    set_lane(mesh, tree.order[leaf.first + std::min(lane, leaf.count - 1)], lane, leaf, vertices);
+  }
 }
 
 void fill_leaf(const LatticeMesh& mesh, const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
@@ -155,7 +167,8 @@ void fill_leaf(const LatticeMesh& mesh, const KernelSamples& samples, BlockerTre
     const std::uint32_t place = leaf.first + std::min(lane, leaf.count - 1);  // unused lanes repeat the last triangle
     if (lane < leaf.count) tree.blockers[place] = make_blocker(mesh, samples, tree.order[place]);
     const Blocker& b = tree.blockers[place];
-    set_lane(b, lane, leaf);
+    for (int k = 0; k < 3; ++k) leaf.normal[k][lane] = b.normal[k];
+    leaf.side_error[lane] = b.side_error;
     leaf.samples_above |= std::uint32_t{b.samples_above} << lane;
     leaf.samples_below |= std::uint32_t{b.samples_below} << lane;
     leaf.perforated |= std::uint32_t{b.perforated} << lane;
@@ -198,6 +211,13 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
   flatten(*build(items, 0), tree);
   tree.order.reserve(items.size());
   for (const Item& item : items) tree.order.push_back(item.triangle);
+  place_blockers(mesh, tree);
+}
+
+void place_blockers(const LatticeMesh& mesh, BlockerTree& tree) {
+  parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) fill_lanes(mesh, tree, tree.leaves[i]);
+  });
 }
 
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,

@@ -30,7 +30,9 @@ struct BlockerTree {
   };
   /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
   struct alignas(64) Leaf {
-    float corner[3][3][kWidth];  // [corner][axis][lane]
+    float corner[3][3][kWidth];             // [corner][axis][lane]
+    float vertex[3][3 * kWidth];            // [axis][vertex]: the corners again, equal ones once
+    std::uint8_t corner_vertex[3][kWidth];  // [corner][lane] -> vertex
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
@@ -60,6 +62,10 @@ struct BlockerTree {
 
 /// Order, leaves and topology by binned surface area heuristic. Equal bits for any number of threads.
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);
+
+/// What the leaves hold of the mesh that does not depend on a light, anew: for a mesh that moved since the tree was
+/// built.
+void place_blockers(const LatticeMesh& mesh, BlockerTree& tree);
 
 /// Blockers and bounds for a light.
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,

@@ -95,7 +95,9 @@ void even_out(std::vector<ExactScratch>& scratches) {
   }
 }
 
-void clear_counters(ExactScratch& scratch) {
+/// Nothing is left of the light of an earlier call but memory.
+void start_anew(ExactScratch& scratch) {
+  scratch.lines.placed = PictureLines::kNothing;
   scratch.counters = {};
   scratch.leaves_listed = scratch.leaves_tested = scratch.clusters_lit = 0;
 }
@@ -141,13 +143,13 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
   const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
-  const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
+  const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch>& scratches = work.scratches;
   scratches.resize(kTasksPerRound);
   even_out(scratches);
-  for (ExactScratch& scratch : scratches) clear_counters(scratch);
+  for (ExactScratch& scratch : scratches) start_anew(scratch);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {

@@ -249,7 +249,8 @@ TEST_CASE("wrong calls are refused by name and write nothing") {
   };
   const ShadowOutput out{.masks = masks, .visibility = visibility};
   CHECK(call(ground.view(), {.masks = std::span(masks).first(15)}) == "output: 15 entries for masks, 16 are needed");
-  CHECK(call({.positions = ground.positions}, {.irradiance = std::vector<vec3>(16)}) ==
+  std::vector<vec3> irradiance(16);
+  CHECK(call({.positions = ground.positions}, {.irradiance = irradiance}) ==
         "output: irradiance needs receivers with normals");
   ground.positions[5].z = std::nan("");
   CHECK(call(ground.view(), out) == "receiver 5: the position is not finite");
