@@ -153,10 +153,24 @@ void set_lane(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t lan
   leaf.triangle[lane] = triangle;
 }
 
+void set_edges(std::uint32_t lane, BlockerTree::Leaf& leaf, std::uint32_t& edges) {
+  for (int k = 0; k < 3; ++k) {
+    const std::uint8_t a = leaf.corner_vertex[k][lane], b = leaf.corner_vertex[(k + 1) % 3][lane];
+    std::uint32_t e = 0;
+    const auto is = [&](std::uint8_t from, std::uint8_t to) {
+      return leaf.edge_vertex[0][e] == from && leaf.edge_vertex[1][e] == to;
+    };
+    while (e < edges && !is(a, b) && !is(b, a)) ++e;
+    if (e == edges) leaf.edge_vertex[0][e] = a, leaf.edge_vertex[1][e] = b, ++edges;
+    leaf.corner_edge[k][lane] = static_cast<std::uint8_t>(e | (is(a, b) ? 0 : BlockerTree::kReversed));
+  }
+}
+
 void fill_lanes(const LatticeMesh& mesh, const BlockerTree& tree, BlockerTree::Leaf& leaf) {
-  std::uint32_t vertices = 0;
+  std::uint32_t vertices = 0, edges = 0;
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     set_lane(mesh, tree.order[leaf.first + std::min(lane, leaf.count - 1)], lane, leaf, vertices);
+    set_edges(lane, leaf, edges);
   }
 }
 

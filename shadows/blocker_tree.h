@@ -21,6 +21,7 @@ struct LightFrame {
 struct BlockerTree {
   static constexpr std::uint32_t kWidth = 16;
   static constexpr std::uint32_t kLeafBit = 0x80000000u;
+  static constexpr std::uint8_t kReversed = 0x80;
 
   /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit.
   struct alignas(64) Node {
@@ -33,6 +34,9 @@ struct BlockerTree {
     float corner[3][3][kWidth];             // [corner][axis][lane]
     float vertex[3][3 * kWidth];            // [axis][vertex]: the corners again, equal ones once
     std::uint8_t corner_vertex[3][kWidth];  // [corner][lane] -> vertex
+    std::uint8_t edge_vertex[2][3 * kWidth];  // [end][edge] -> vertex; edges between equal vertices once
+    std::uint8_t corner_edge[3][kWidth];      // [corner][lane] -> edge from there to the next; kReversed where it runs
+                                              // against the edge's own direction
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order

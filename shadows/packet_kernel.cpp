@@ -30,6 +30,7 @@ struct Packet {
   std::size_t first = 0, count = 0;
   Vec3 position, to_center;           // lattice; from there to the light's centre
   Vec distance;                       // bound on |coordinate| of receiver to sample
+  Vec height_error, place_error;  // 5 |r - c| / height + 10; 5 |r - c|: see ProjectVertices
   Vec column, row, height;  // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                        // own triangle
   vec3 low, high;                     // box around the receivers, lattice
@@ -41,24 +42,25 @@ struct Packet {
 
 /// Rectangles as whole rows and columns of the picture, a lane each; none where first > last.
 struct PictureRanges {
-  alignas(HWY_MAX_BYTES) std::int32_t row[2][kMaxLanes], column[2][kMaxLanes];  // [first, last]
+  std::int32_t row[2][BlockerTree::kWidth], column[2][BlockerTree::kWidth];  // [first, last]
 };
 
-/// Rows and columns that may lie in a rectangle.
-HWY_INLINE void FindRanges(const SampleRows& rows, const LaneRectangles& q, PictureRanges& ranges) {
+/// Rows and columns that may lie in a rectangle, from lane i of the ranges on.
+HWY_INLINE void FindRanges(const SampleRows& rows, const LaneRectangles& q, std::size_t i, PictureRanges& ranges) {
   const Tag d;
   const IntTag di;
   constexpr float kSlack = 1e-3f;
   const Vec least = hn::Set(d, -1.0f), most = hn::Set(d, 65.0f);
   const auto whole = [&](Vec v) { return hn::ConvertTo(di, hn::Min(hn::Max(v, least), most)); };
   const Vec scale = hn::Set(d, rows.scale), row_scale = hn::Set(d, rows.row_scale);
-  hn::Store(whole(hn::Ceil(hn::MulAdd(q.low[0], scale, hn::Set(d, rows.least_offset - kSlack)))), di, ranges.column[0]);
-  hn::Store(whole(hn::Floor(hn::MulAdd(q.high[0], scale, hn::Set(d, rows.most_offset + kSlack)))), di,
-            ranges.column[1]);
-  hn::Store(whole(hn::Ceil(hn::MulAdd(q.low[1], row_scale, hn::Set(d, rows.least_row_offset - kSlack)))), di,
-            ranges.row[0]);
-  hn::Store(whole(hn::Floor(hn::MulAdd(q.high[1], row_scale, hn::Set(d, rows.most_row_offset + kSlack)))), di,
-            ranges.row[1]);
+  hn::StoreU(whole(hn::Ceil(hn::MulAdd(q.low[0], scale, hn::Set(d, rows.least_offset - kSlack)))), di,
+             ranges.column[0] + i);
+  hn::StoreU(whole(hn::Floor(hn::MulAdd(q.high[0], scale, hn::Set(d, rows.most_offset + kSlack)))), di,
+             ranges.column[1] + i);
+  hn::StoreU(whole(hn::Ceil(hn::MulAdd(q.low[1], row_scale, hn::Set(d, rows.least_row_offset - kSlack)))), di,
+             ranges.row[0] + i);
+  hn::StoreU(whole(hn::Floor(hn::MulAdd(q.high[1], row_scale, hn::Set(d, rows.most_row_offset + kSlack)))), di,
+             ranges.row[1] + i);
 }
 
 /// One lane's range, cut to the picture.
@@ -94,20 +96,18 @@ struct PictureRange {
   }
 };
 
-/// Of the lanes in `active`, those whose rectangle may hold a sample that some receiver has open.
+/// Of the lanes in `active` (lane i of the ranges is the first), those whose rectangle may hold a sample that some receiver has open.
 HWY_INLINE std::uint64_t LanesOverOpenSamples(const SampleRows& rows, const LaneRectangles& q, std::uint64_t active,
-                                              const Packet& packet, PictureRanges& ranges) {
+                                              const Packet& packet, std::size_t i, const PictureRanges& ranges) {
   const Tag d;
   const Rectangle& light = packet.shaft.light;
   active &=
       Bits(hn::And(hn::And(hn::Le(q.low[0], hn::Set(d, light.high_u)), hn::Ge(q.high[0], hn::Set(d, light.low_u))),
                    hn::And(hn::Le(q.low[1], hn::Set(d, light.high_v)), hn::Ge(q.high[1], hn::Set(d, light.low_v)))));
-  if (active == 0) return 0;
-  FindRanges(rows, q, ranges);
   std::uint64_t kept = 0;
   for (; active != 0; active &= active - 1) {
     const auto lane = static_cast<std::size_t>(std::countr_zero(active));
-    kept |= std::uint64_t{PictureRange(rows, ranges, lane).is_open(rows, packet)} << lane;
+    kept |= std::uint64_t{PictureRange(rows, ranges, i + lane).is_open(rows, packet)} << lane;
   }
   return kept;
 }
@@ -119,22 +119,25 @@ HWY_INLINE std::uint64_t BoxesOverOpenSamples(const SampleRows& rows, const floa
   const std::uint64_t between = Bits(ProjectBoxes(packet.shaft, low, high, i, q));
   const Vec pad = hn::Set(Tag(), ProjectionPad(packet.shaft.low[2]) + rows.deviation);
   for (int k = 0; k < 2; ++k) q.low[k] = hn::Sub(q.low[k], pad), q.high[k] = hn::Add(q.high[k], pad);
+  if (between == 0) return 0;
   PictureRanges ranges;
-  return LanesOverOpenSamples(rows, q, between, packet, ranges);
+  FindRanges(rows, q, 0, ranges);
+  return LanesOverOpenSamples(rows, q, between, packet, 0, ranges);
 }
 
-/// Triangles of a leaf, a lane each, as the packet sees them. Bits are lanes.
-struct PacketView {
-  std::uint64_t above = 0, below = 0;  // the plane lies above (below) all receivers, along the triangle's normal
-  std::uint64_t active = 0;            // may hide something from some receiver
-  std::uint64_t bounded = 0;           // all of it projects onto the light's plane
-  LaneRectangles on_light;
-  alignas(HWY_MAX_BYTES) float pad[kMaxLanes];  // rounding of a corner's place on the light, in lengths
+/// Triangles of a leaf as the packet sees them. Bits are triangles.
+struct LeafView {
+  std::uint32_t above = 0, below = 0;  // the plane lies above (below) all receivers, along the triangle's normal
+  std::uint32_t active = 0;            // may hide something from some receiver
+  std::uint32_t bounded = 0;           // all of it projects onto the light's plane
+  std::uint32_t kept = 0;              // active, and over what some receiver has open
+  alignas(HWY_MAX_BYTES) float pad[BlockerTree::kWidth];  // rounding of a corner's place on the light, in lengths
+  PictureRanges ranges;
 };
 
 /// On which side of the planes the packet's box lies, and so whether they separate it from samples.
 HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const Packet& packet, const vec3& half,
-                          const Vec3& to_corner, PacketView& view) {
+                          const Vec3& to_corner, LeafView& view) {
   const Tag d;
   const Vec3 normal{hn::LoadU(d, leaf.normal[0] + i), hn::LoadU(d, leaf.normal[1] + i),
                     hn::LoadU(d, leaf.normal[2] + i)};
@@ -142,25 +145,25 @@ HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const Pa
   const Vec reach = Dot({hn::Abs(normal.x), hn::Abs(normal.y), hn::Abs(normal.z)}, Splat(half));
   const Vec far = hn::Add(Norm1(to_corner), hn::Set(d, half.x + half.y + half.z));
   const Vec error = hn::MulAdd(hn::Mul(hn::LoadU(d, leaf.side_error + i), far), hn::Set(d, 2.0f), reach);
-  view.above = Bits(hn::Gt(side, error));
-  view.below = Bits(hn::Lt(side, hn::Neg(error)));
+  const auto above = static_cast<std::uint32_t>(Bits(hn::Gt(side, error))),
+             below = static_cast<std::uint32_t>(Bits(hn::Lt(side, hn::Neg(error))));
   const bool outside_box = packet.low.x > leaf.box_high.x || packet.low.y > leaf.box_high.y ||
                            packet.low.z > leaf.box_high.z || packet.high.x < leaf.box_low.x ||
                            packet.high.y < leaf.box_low.y || packet.high.z < leaf.box_low.z;
-  const std::uint64_t in_leaf = leaf.count - i < 64 ? (std::uint64_t{1} << (leaf.count - i)) - 1 : ~std::uint64_t{0};
-  const std::uint64_t samples_above = leaf.samples_above >> i,
+  const std::uint32_t in_leaf = (1u << std::min<std::size_t>(leaf.count - i, hn::Lanes(d))) - 1;
+  const std::uint32_t samples_above = leaf.samples_above >> i,
                       samples_below = (leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u)) >> i;
-  view.active = ((samples_above & ~view.below) | (samples_below & ~view.above)) & in_leaf;
+  view.above |= above << i, view.below |= below << i;
+  view.active |= (((samples_above & ~below) | (samples_below & ~above)) & in_leaf) << i;
 }
 
 /// Rectangles around what the triangles hide of the light's plane from any of the receivers in `box`; corners are given
 /// from the point `from` amid them. From r, a point v projects
 /// to v + (v - r) w with w = v_z / (r_z - v_z).
-HWY_INLINE void ProjectOntoLight(const LightFrame& frame, const std::array<Vec3, 3>& to_corner, const vec3& from,
-                                 const Shaft& box, PacketView& view) {
+HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<Vec3, 3>& to_corner, const vec3& from,
+                                     const Shaft& box, LaneRectangles& q, Vec& pad) {
   const Tag d;
   const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
-  LaneRectangles& q = view.on_light;
   const vec3 middle(frame.to_frame(dvec3(from)));
   float half[3];
   for (int k = 0; k < 3; ++k) half[k] = std::max(box.high[k] - middle[k], middle[k] - box.low[k]) + 1e-6f;
@@ -188,9 +191,7 @@ HWY_INLINE void ProjectOntoLight(const LightFrame& frame, const std::array<Vec3,
   farthest = hn::Add(farthest, hn::Set(d, half[0] + half[1] + half[2]));
   const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
   const Vec magnified = hn::Div(hn::Mul(farthest, hn::Set(d, 1e-6f * (box.high[2] + 4.0f))), least);
-  const Vec pad = hn::Add(magnified, hn::Set(d, ProjectionPad(box.low[2])));
-  view.bounded = Bits(bounded);
-  hn::Store(pad, d, view.pad);
+  pad = hn::Add(magnified, hn::Set(d, ProjectionPad(box.low[2])));
   const Vec everywhere = hn::Set(d, 1e9f), margin = hn::Set(d, 2e-5f);
   for (int axis = 0; axis < 2; ++axis) {
     const Vec low =
@@ -199,10 +200,12 @@ HWY_INLINE void ProjectOntoLight(const LightFrame& frame, const std::array<Vec3,
     q.low[axis] = hn::IfThenElse(bounded, hn::Sub(q.low[axis], pad), low);
     q.high[axis] = hn::IfThenElse(bounded, hn::Add(q.high[axis], pad), high);
   }
+  return bounded;
 }
 
-HWY_INLINE PacketView ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& leaf, std::size_t i,
-                                    const Packet& packet) {
+/// Triangles from `i` on.
+HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& leaf, std::size_t i,
+                              const Packet& packet, LeafView& view) {
   const Tag d;
   const vec3 middle = 0.5f * (packet.low + packet.high);
   const vec3 half = glm::max(packet.high - middle, middle - packet.low) * (1.0f + 0x1p-20f);
@@ -212,15 +215,22 @@ HWY_INLINE PacketView ViewTriangles(const ExactScene& scene, const BlockerTree::
         {hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i), hn::LoadU(d, leaf.corner[k][2] + i)},
         Splat(middle));
   }
-  PacketView view;
   FindSides(leaf, i, packet, half, to_corner[0], view);
-  if (view.active != 0) ProjectOntoLight(scene.frame, to_corner, middle, packet.shaft, view);
-  return view;
+  const std::uint64_t active = (view.active >> i) & ((std::uint64_t{1} << hn::Lanes(d)) - 1);
+  if (active == 0) return;
+  LaneRectangles q;
+  Vec pad;
+  view.bounded |= static_cast<std::uint32_t>(Bits(ProjectOntoLight(scene.frame, to_corner, middle, packet.shaft, q, pad))) << i;
+  hn::StoreU(pad, d, view.pad + i);
+  FindRanges(*scene.rows, q, i, view.ranges);
+  view.kept |= static_cast<std::uint32_t>(LanesOverOpenSamples(*scene.rows, q, active, packet, i, view.ranges)) << i;
 }
 
-/// Vertices of a leaf as each receiver sees them before the light, in columns and rows.
+/// Vertices of a leaf as each receiver sees them before the light, in columns and rows; `error` bounds how far they may
+/// lie off, in lengths along either axis.
 struct ProjectedVertices {
-  alignas(HWY_MAX_BYTES) float column[3 * BlockerTree::kWidth][kMaxLanes], row[3 * BlockerTree::kWidth][kMaxLanes];
+  alignas(HWY_MAX_BYTES) float column[3 * BlockerTree::kWidth][kMaxLanes], row[3 * BlockerTree::kWidth][kMaxLanes],
+      error[3 * BlockerTree::kWidth][kMaxLanes];
 };
 
 /// Those in `wanted`, which must lie between the receivers and the light.
@@ -233,9 +243,14 @@ HWY_INLINE void ProjectVertices(const ExactScene& scene, const BlockerTree::Leaf
   for (; wanted != 0; wanted &= wanted - 1) {
     const auto v = static_cast<std::size_t>(std::countr_zero(wanted));
     const Vec3 way = Subtract(Splat({leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]}), packet.position);
-    const Vec scale = hn::Div(packet.height, Dot(way, down));
+    const Vec inverse = hn::Div(hn::Set(d, 1.0f), Dot(way, down)), scale = hn::Mul(packet.height, inverse);
     hn::Store(hn::MulAdd(Dot(way, axis_x), scale, packet.column), d, projected.column[v]);
     hn::Store(hn::MulAdd(Dot(way, axis_y), scale, packet.row), d, projected.row[v]);
+    // In units of 2^-24: a coordinate along an axis is within 5 |way|, the depth as well, the height within 5 |r - c|.
+    const Vec length = Norm1(way);
+    const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 5.0f), length), inverse, packet.height_error);
+    hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet.place_error)), d,
+              projected.error[v]);
   }
 }
 
@@ -423,6 +438,15 @@ class Outline {
   const HalfPlane *low_[2], *high_[2];
 };
 
+/// Edges around a patch of triangles, each from a vertex to the next, as the receivers see them in columns and rows.
+struct PatchOutline {
+  static constexpr std::uint32_t kMost = 31;  // and so it winds around nothing more than 15 times
+  std::uint32_t count = 0;
+  std::uint8_t from[kMost + 1], to[kMost + 1];
+  alignas(HWY_MAX_BYTES) float slope[kMost + 1][kMaxLanes], width[kMost + 1][kMaxLanes];  // columns a row; uncertainty
+  std::uint32_t on_row[SampleRows::kMaxRows];  // edges that cross the row for some receiver, as bits
+};
+
 /// A packet at work on its receivers.
 class PacketSolver {
  public:
@@ -454,8 +478,14 @@ class PacketSolver {
   bool Begin(std::size_t first, std::size_t count);
   bool FindOpenPart();
   bool RasterizeLeaf(const BlockerTree::Leaf& leaf);
-  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, const PacketView& view,
-                         std::size_t view_lane, const PictureRange& range);
+  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, LaneMask active);
+  std::uint32_t FindPatch(const BlockerTree::Leaf& leaf);
+  HWY_INLINE LaneMask SetOutline(const BlockerTree::Leaf& leaf, std::uint64_t projected);
+  HWY_INLINE UintVec WindLine(std::uint32_t line, UintVec& doubtful) const;
+  bool RasterizePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint64_t projected,
+                      LaneMask& not_patched);
+  void SettlePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint32_t line,
+                   const std::uint32_t* doubtful, std::uint32_t* blocked);
   void StoreMasks();
 
   HWY_INLINE void SetPlanes(const BlockerTree::Leaf& leaf, std::size_t lane, PacketTriangle& triangle) const;
@@ -476,6 +506,8 @@ class PacketSolver {
   KernelCounters& counters_;
   Packet packet_;
   LineSet changed_lines_;
+  LeafView view_;                                 // of the leaf at work
+  PatchOutline outline_;                          // of the patch at work
   ProjectedVertices vertices_;                    // of the leaf at work
   std::optional<TexelLookup> texels_[kMaxLanes];  // of the perforated triangle at work, made when first needed
 };
@@ -502,6 +534,8 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   packet_.column = Dot(from_center, Splat(rows_.axis_x * rows_.scale));
   packet_.row = Dot(from_center, Splat(rows_.axis_y * rows_.row_scale));
   packet_.height = Dot(from_center, Splat(vec3(scene_.frame.n)));
+  packet_.place_error = hn::Mul(hn::Set(d, 5.0f), Norm1(from_center));
+  packet_.height_error = hn::Add(hn::Div(packet_.place_error, packet_.height), hn::Set(d, 10.0f));
   packet_.distance =
       hn::Add(NormMax(packet_.to_center), hn::Set(d, scene_.samples->reach + rows_.deviation / kDeterminantError));
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));
@@ -542,24 +576,238 @@ bool PacketSolver::FindOpenPart() {
 
 /// Up to 16 triangles; true where samples were blocked.
 bool PacketSolver::RasterizeLeaf(const BlockerTree::Leaf& leaf) {
-  bool added = false;
   counters_.pairs_tested += leaf.count * packet_.count;
-  for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(Tag())) {
-    const PacketView view = ViewTriangles(scene_, leaf, i, packet_);
-    if (view.active == 0) continue;
-    PictureRanges ranges;
-    const std::uint64_t kept = LanesOverOpenSamples(rows_, view.on_light, view.active, packet_, ranges);
-    std::uint64_t vertices = 0;
-    for (std::uint64_t rest = kept & view.bounded; rest != 0; rest &= rest - 1) {
-      const std::size_t lane = i + static_cast<std::size_t>(std::countr_zero(rest));
-      for (const auto& vertex : leaf.corner_vertex) vertices |= std::uint64_t{1} << vertex[lane];
-    }
-    ProjectVertices(scene_, leaf, vertices, packet_, vertices_);
-    for (std::uint64_t rest = kept; rest != 0; rest &= rest - 1) {
-      const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-      added |= RasterizeTriangle(leaf, i + lane, view, lane, PictureRange(rows_, ranges, lane));
+  LeafView& view = view_;
+  view.above = view.below = view.bounded = view.active = view.kept = 0;
+  for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(Tag())) ViewTriangles(scene_, leaf, i, packet_, view);
+  if (view.kept == 0) return false;
+  std::uint64_t vertices = 0;
+  for (std::uint32_t rest = view.kept & view.bounded; rest != 0; rest &= rest - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+    for (const auto& vertex : leaf.corner_vertex) vertices |= std::uint64_t{1} << vertex[lane];
+  }
+  ProjectVertices(scene_, leaf, vertices, packet_, vertices_);
+  const Tag d;
+  const LaneMask everyone = hn::FirstN(d, packet_.count), none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
+  bool added = false;
+  std::uint32_t in_patch = 0;
+  LaneMask not_patched = none;
+  if (!rows_.place.empty() && std::popcount(view.kept) >= 3) {
+    in_patch = FindPatch(leaf);
+    if (in_patch != 0) added = RasterizePatch(leaf, in_patch, vertices, not_patched);
+  }
+  for (std::uint32_t rest = view.kept; rest != 0; rest &= rest - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+    const LaneMask asked = (in_patch >> lane) & 1 ? not_patched : everyone;
+    if (!hn::AllFalse(d, asked)) added |= RasterizeTriangle(leaf, lane, asked);
+  }
+  return added;
+}
+
+/// Triangles that are seen from one side by all receivers, lie whole between them and the whole light, and are opaque:
+/// a sample is blocked where the outlines of the triangles wind around it, and edges between two of them cancel. Fills
+/// outline_; empty where patches of this leaf would not pay, or could wind around a sample 16 times.
+std::uint32_t PacketSolver::FindPatch(const BlockerTree::Leaf& leaf) {
+  const UintTag du;
+  const LeafView& view = view_;
+  std::uint32_t patch = ((view.above & ~leaf.samples_below) | (view.below & ~leaf.samples_above)) & view.bounded &
+                        view.active & ~leaf.perforated;
+  const float most = 0.02f / std::max(rows_.scale, rows_.row_scale);
+  for (std::uint32_t rest = patch; rest != 0; rest &= rest - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+    const bool is_own = !hn::AllFalse(du, hn::Eq(packet_.own, hn::Set(du, leaf.triangle[lane])));
+    if (is_own || view.pad[lane] > most) patch &= ~(1u << lane);
+  }
+  const int wanted = std::popcount(patch & view.kept);
+  if (wanted < 3) return 0;
+  std::uint64_t once[2] = {0, 0}, twice[2] = {0, 0}, thrice = 0;  // uses of edges, by direction
+  for (std::uint32_t rest = patch; rest != 0; rest &= rest - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+    const std::uint32_t turned = (view.below >> lane) & 1;
+    for (const auto& edge : leaf.corner_edge) {
+      const std::uint64_t bit = std::uint64_t{1} << (edge[lane] & ~BlockerTree::kReversed);
+      const std::uint32_t way = (edge[lane] & BlockerTree::kReversed ? 1u : 0u) ^ turned;
+      thrice |= twice[way] & bit;
+      twice[way] |= once[way] & bit;
+      once[way] |= bit;
     }
   }
+  const std::uint64_t both = once[0] & once[1];
+  if (thrice != 0 || (both & (twice[0] ^ twice[1])) != 0) return 0;
+  outline_.count = 0;
+  for (std::uint32_t way = 0; way < 2; ++way) {
+    const std::uint64_t single = once[way] & ~both;
+    const int uses = std::popcount(single) + std::popcount(single & twice[way]);
+    if (static_cast<int>(outline_.count) + uses > std::min(static_cast<int>(PatchOutline::kMost), 4 * wanted)) return 0;
+    for (std::uint64_t rest = single; rest != 0; rest &= rest - 1) {
+      const auto edge = static_cast<std::size_t>(std::countr_zero(rest));
+      const std::uint8_t a = leaf.edge_vertex[way][edge], b = leaf.edge_vertex[1 - way][edge];
+      outline_.from[outline_.count] = a, outline_.to[outline_.count++] = b;
+      if ((twice[way] >> edge) & 1) outline_.from[outline_.count] = a, outline_.to[outline_.count++] = b;
+    }
+  }
+  return patch;
+}
+
+/// Vertices of the outline, and its edges as the receivers see them. Returns the receivers for which no vertex lies on a
+/// row, so far as can be told.
+HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std::uint64_t projected) {
+  const Tag d;
+  std::uint64_t used = 0;
+  for (std::uint32_t e = 0; e < outline_.count; ++e) used |= std::uint64_t{1} << outline_.from[e];
+  ProjectVertices(scene_, leaf, used & ~projected, packet_, vertices_);
+  const Vec row_offset = hn::Set(d, 0.5f * (rows_.least_row_offset + rows_.most_row_offset));
+  const Vec spread = hn::Set(d, rows_.most_row_offset - rows_.least_row_offset + rows_.deviation * rows_.row_scale + 1e-5f);
+  const Vec row_scale = hn::Set(d, rows_.row_scale), end = hn::Set(d, static_cast<float>(rows_.rows));
+  LaneMask on_row = hn::Lt(end, end);
+  for (std::uint64_t rest = used; rest != 0; rest &= rest - 1) {
+    const auto v = static_cast<std::size_t>(std::countr_zero(rest));
+    const Vec row = hn::Add(hn::Load(d, vertices_.row[v]), row_offset), nearest = hn::Round(row);
+    const Vec error = hn::MulAdd(hn::Load(d, vertices_.error[v]), row_scale, spread);
+    on_row = hn::Or(on_row, hn::And(hn::Le(hn::Abs(hn::Sub(row, nearest)), error),
+                                    hn::And(hn::Ge(nearest, hn::Zero(d)), hn::Lt(nearest, end))));
+  }
+  std::fill_n(outline_.on_row, rows_.rows, 0u);
+  for (std::uint32_t e = 0; e < outline_.count; ++e) {
+    const std::size_t a = outline_.from[e], b = outline_.to[e];
+    const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
+              dx = hn::Sub(hn::Load(d, vertices_.column[b]), xa), dy = hn::Sub(hn::Load(d, vertices_.row[b]), ya);
+    const Vec slope = hn::Div(dx, hn::IfThenElse(hn::Eq(dy, hn::Zero(d)), hn::Set(d, 1.0f), dy));
+    const Vec error = hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])),
+                              hn::Set(d, rows_.deviation));
+    Vec width = hn::Mul(error, hn::MulAdd(hn::Abs(slope), row_scale, hn::Set(d, rows_.scale)));
+    width = hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(dx)), hn::Set(d, 0x1p-20f), width);
+    width = hn::Add(width, hn::Set(d, 0x1p-16f));
+    hn::Store(slope, d, outline_.slope[e]);
+    hn::Store(width, d, outline_.width[e]);
+    // Edges to the right of the picture hide nothing of it.
+    const Vec left = hn::Sub(hn::Min(xa, hn::Add(xa, dx)), width), yb = hn::Add(ya, dy);
+    if (hn::AllTrue(d, hn::Gt(left, hn::Set(d, static_cast<float>(rows_.columns) - rows_.least_offset)))) continue;
+    const float low = hn::GetLane(hn::MinOfLanes(d, hn::Min(ya, yb))), high = hn::GetLane(hn::MaxOfLanes(d, hn::Max(ya, yb)));
+    const auto first = static_cast<std::int32_t>(std::max(low + rows_.least_row_offset - 1e-3f, 0.0f));
+    const float last = std::min(high + rows_.most_row_offset + 1e-3f, static_cast<float>(rows_.rows) - 1.0f);
+    for (std::int32_t row = first; static_cast<float>(row) <= last; ++row) outline_.on_row[row] |= 1u << e;
+  }
+  return hn::Not(on_row);
+}
+
+/// Numbers of four bits, one for each sample of a line.
+struct WindingNumbers {
+  UintVec bit[4];
+  HWY_INLINE void Add(UintVec one) {
+    for (UintVec& b : bit) {
+      const UintVec carry = hn::And(b, one);
+      b = hn::Xor(b, one), one = carry;
+    }
+  }
+  HWY_INLINE void Subtract(UintVec one) {
+    for (UintVec& b : bit) {
+      const UintVec borrow = hn::AndNot(b, one);
+      b = hn::Xor(b, one), one = borrow;
+    }
+  }
+};
+
+/// One line of a patch: the samples that it winds around, and those so near to an outline that this is not certain.
+HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful) const {
+  const Tag d;
+  const UintTag du;
+  const PictureLines& l = *packet_.lines;
+  const Vec y = hn::Set(d, rows_.place[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
+  const Vec shifter = hn::Set(d, 0x1p23f), half = hn::Set(d, 0.5f);
+  const UintVec zero = hn::Zero(du), ones = hn::Set(du, ~0u), shifter_bits = hn::Set(du, 0x4b000000u);
+  WindingNumbers winding{{zero, zero, zero, zero}};
+  doubtful = zero;
+  for (std::uint32_t edges = outline_.on_row[line % rows_.rows]; edges != 0; edges &= edges - 1) {
+    const auto e = static_cast<std::size_t>(std::countr_zero(edges));
+    const std::size_t a = outline_.from[e], b = outline_.to[e];
+    const Vec ya = hn::Load(d, vertices_.row[a]);
+    const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
+    const LaneMask crossing = hn::Xor(behind, before);
+    const Vec x = hn::MulAdd(hn::Load(d, outline_.slope[e]), hn::Sub(y, ya), hn::Load(d, vertices_.column[a]));
+    const Vec place = hn::Min(hn::Max(hn::Add(x, offset), hn::Zero(d)), hn::Set(d, 33.0f));
+    const Vec from = hn::Add(place, shifter);
+    const Vec width = hn::Load(d, outline_.width[e]);
+    const Vec off = hn::Abs(hn::Sub(place, hn::Sub(from, shifter)));  // a half where x is a column
+    const LaneMask unsure = hn::And(crossing, hn::Ge(off, hn::Sub(half, width)));
+    if (!hn::AllFalse(d, unsure)) {
+      doubtful = hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure),
+                                                     ColumnsBetween(hn::Sub(x, width), hn::Add(x, width), offset, rest)));
+    }
+    const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits);
+#if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
+    const UintVec beyond = hn::Shl(ones, first);
+#else
+    const UintVec beyond = hn::IfThenElseZero(hn::Lt(first, hn::Set(du, 32u)), hn::Shl(ones, hn::And(first, hn::Set(du, 31u))));
+#endif
+    const LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
+    if (!hn::AllFalse(d, down)) winding.Add(hn::IfThenElseZero(hn::RebindMask(du, down), beyond));
+    if (!hn::AllFalse(d, up)) winding.Subtract(hn::IfThenElseZero(hn::RebindMask(du, up), beyond));
+  }
+  return hn::Or(hn::Or(winding.bit[0], winding.bit[1]), hn::Or(winding.bit[2], winding.bit[3]));
+}
+
+/// Doubtful samples of a line by the exact predicate: does a triangle of the patch block them?
+void PacketSolver::SettlePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint32_t line,
+                               const std::uint32_t* doubtful, std::uint32_t* blocked) {
+  for (std::size_t lane = 0; lane < packet_.count; ++lane) {
+    const std::size_t first =
+        std::size_t{receivers_.set[packet_.first + lane]} * scene_.samples->padded + rows_.first_sample(line);
+    for (std::uint32_t rest = doubtful[lane]; rest != 0; rest &= rest - 1) {
+      const auto bit = static_cast<std::size_t>(std::countr_zero(rest));
+      bool is_blocked = false;
+      for (std::uint32_t t = patch; t != 0 && !is_blocked; t &= t - 1) {
+        const auto k = static_cast<std::size_t>(std::countr_zero(t));
+        const PictureRange range(rows_, view_.ranges, k);
+        const auto row = static_cast<std::int32_t>(line % rows_.rows),
+                   column = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord + bit);
+        if (row < range.first_row || row > range.last_row || column < range.first_column || column > range.last_column)
+          continue;
+        ++counters_.exact_fallbacks;
+        const auto& corner = scene_.tree->blockers[leaf.first + k].corner;
+        is_blocked = blocks(corner[0], corner[1], corner[2], Position(lane), scene_.samples->points[first + bit]);
+      }
+      blocked[lane] |= std::uint32_t{is_blocked} << bit;
+    }
+  }
+}
+
+/// A patch into all pictures but those of `not_patched`, which need its triangles one by one.
+bool PacketSolver::RasterizePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint64_t projected,
+                                  LaneMask& not_patched) {
+  const Tag d;
+  const UintTag du;
+  const LaneMask patched = hn::And(hn::FirstN(d, packet_.count), SetOutline(leaf, projected));
+  not_patched = hn::AndNot(patched, hn::FirstN(d, packet_.count));
+  LineSet lines;
+  for (std::uint32_t rest = patch & view_.kept; rest != 0; rest &= rest - 1) {
+    PictureRange(rows_, view_.ranges, static_cast<std::size_t>(std::countr_zero(rest)))
+        .for_open_lines(rows_, packet_, [&](std::uint32_t line) {
+          lines.add(line);
+          return false;
+        });
+  }
+  ++counters_.pairs_sampled;
+  const UintVec wanted = hn::VecFromMask(du, hn::RebindMask(du, patched));
+  bool added = false;
+  lines.for_each([&](std::uint32_t line) HWY_ATTR {
+    const UintVec open = hn::Load(du, packet_.open[line]), asked = hn::And(open, wanted);
+    UintVec doubtful;
+    ++counters_.sample_tests;
+    UintVec blocked = hn::And(WindLine(line, doubtful), asked);
+    doubtful = hn::And(doubtful, asked);
+    if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
+      alignas(HWY_MAX_BYTES) std::uint32_t in_doubt[kMaxLanes], does[kMaxLanes];
+      hn::Store(doubtful, du, in_doubt), hn::Store(hn::AndNot(doubtful, blocked), du, does);
+      SettlePatch(leaf, patch, line, in_doubt, does);
+      blocked = hn::Load(du, does);
+    }
+    if (hn::AllTrue(du, hn::Eq(blocked, hn::Zero(du)))) return;
+    hn::Store(hn::AndNot(blocked, open), du, packet_.open[line]);
+    changed_lines_.add(line);
+    added = true;
+  });
+  counters_.pairs_necessary += added;
   return added;
 }
 
@@ -685,18 +933,17 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Li
   return added;
 }
 
-/// One triangle into all pictures; true where samples were blocked.
-bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, const PacketView& view,
-                                     std::size_t view_lane, const PictureRange& range) {
+/// One triangle into the pictures of the receivers in `active`; true where samples were blocked.
+bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, LaneMask active) {
   const Tag d;
   const UintTag du;
-  LaneMask active = hn::And(hn::FirstN(d, packet_.count),
-                            hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
+  const PictureRange range(rows_, view_.ranges, lane);
+  active = hn::And(active, hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
   LineSet lines;
-  if ((view.bounded >> view_lane) & 1) {
+  if ((view_.bounded >> lane) & 1) {
     const std::array<std::uint8_t, 3> corner = {leaf.corner_vertex[0][lane], leaf.corner_vertex[1][lane],
                                                 leaf.corner_vertex[2][lane]};
-    active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[view_lane], vertices_, range, packet_,
+    active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view_.pad[lane], vertices_, range, packet_,
                                                       lines));
   } else {
     range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
@@ -713,7 +960,7 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t 
     triangle.corner[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
   }
   SetPlanes(leaf, lane, triangle);
-  const bool above = (view.above >> view_lane) & 1, below = (view.below >> view_lane) & 1;
+  const bool above = (view_.above >> lane) & 1, below = (view_.below >> lane) & 1;
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
   LaneMask is_below = below ? hn::Not(none) : none;
   if (!above && !below) {

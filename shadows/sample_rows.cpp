@@ -56,6 +56,9 @@ bool space_rows(SampleRows& rows, std::uint32_t sets) {
   }
   rows.row_scale = static_cast<float>(1.0 / pitch);
   rows.least_row_offset = static_cast<float>(least), rows.most_row_offset = static_cast<float>(most);
+  if (sets == 1 && most - least < 1e-3) {
+    for (const float y : rows.y) rows.place.push_back(y * rows.row_scale);
+  }
   return most - least < 2.0;
 }
 

@@ -20,6 +20,8 @@ struct SampleRows {
   float least_offset = 0.0f, most_offset = 0.0f;  // over all rows (not lines)
   /// Row j lies between (j - most_row_offset) / row_scale and (j - least_row_offset) / row_scale, in all sets.
   float row_scale = 1.0f, least_row_offset = 0.0f, most_row_offset = 0.0f;
+  /// Line l lies at row place[l] of a picture in which y is row_scale y; rows of a single set that are evenly spaced.
+  std::vector<float> place;
   float reach_y = 0.0f;                          // max |y|
   float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
   std::vector<float> y, offset;                  // [set][line]
