@@ -168,38 +168,43 @@ void set_edges(std::uint32_t lane, BlockerTree::Leaf& leaf, std::uint32_t& edges
 
 void fill_lanes(const LatticeMesh& mesh, const BlockerTree& tree, BlockerTree::Leaf& leaf) {
   std::uint32_t vertices = 0, edges = 0;
+  leaf.perforated = 0;
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     set_lane(mesh, tree.order[leaf.first + std::min(lane, leaf.count - 1)], lane, leaf, vertices);
     set_edges(lane, leaf, edges);
+    leaf.perforated |= std::uint32_t{lane < leaf.count && mesh.alpha_map(leaf.triangle[lane]) != kNone} << lane;
   }
+  leaf.vertices = vertices;
 }
 
-void fill_leaf(const LatticeMesh& mesh, const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
-  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = leaf.perforated = 0;
+void fill_leaf(const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
+  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = 0;
   leaf.box_low = vec3(1e30f), leaf.box_high = vec3(-1e30f);
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     const std::uint32_t place = leaf.first + std::min(lane, leaf.count - 1);  // unused lanes repeat the last triangle
-    if (lane < leaf.count) tree.blockers[place] = make_blocker(mesh, samples, tree.order[place]);
+    if (lane < leaf.count) {
+      std::array<vec3, 3> corners;
+      for (int k = 0; k < 3; ++k)
+        corners[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
+      tree.blockers[place] = make_blocker(corners, (leaf.perforated >> lane) & 1, samples, leaf.triangle[lane]);
+    }
     const Blocker& b = tree.blockers[place];
     for (int k = 0; k < 3; ++k) leaf.normal[k][lane] = b.normal[k];
     leaf.side_error[lane] = b.side_error;
     leaf.samples_above |= std::uint32_t{b.samples_above} << lane;
     leaf.samples_below |= std::uint32_t{b.samples_below} << lane;
-    leaf.perforated |= std::uint32_t{b.perforated} << lane;
     if (!b.back_faces_only) continue;
     leaf.back_faces_only |= 1u << lane;
     leaf.box_low = glm::min(leaf.box_low, b.box_low), leaf.box_high = glm::max(leaf.box_high, b.box_high);
   }
 }
 
-Bounds leaf_bounds(const LightFrame& frame, const BlockerTree& tree, const BlockerTree::Leaf& leaf) {
+Bounds leaf_bounds(const LightFrame& frame, const BlockerTree::Leaf& leaf) {
   Bounds bounds;
-  for (std::uint32_t i = 0; i < leaf.count; ++i) {
-    for (const vec3& p : tree.blockers[leaf.first + i].corner) {
-      const dvec3 q = frame.to_frame(dvec3(p));
-      bounds.add(vec3(q - kBoundPad));
-      bounds.add(vec3(q + kBoundPad));
-    }
+  for (std::uint32_t v = 0; v < leaf.vertices; ++v) {
+    const dvec3 q = frame.to_frame(dvec3(leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]));
+    bounds.add(vec3(q - kBoundPad));
+    bounds.add(vec3(q + kBoundPad));
   }
   return bounds;
 }
@@ -242,8 +247,8 @@ void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, c
   node_box.assign(tree.nodes.size(), {});
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      fill_leaf(mesh, samples, tree, tree.leaves[i]);
-      leaf_box[i] = leaf_bounds(frame, tree, tree.leaves[i]);
+      fill_leaf(samples, tree, tree.leaves[i]);
+      leaf_box[i] = leaf_bounds(frame, tree.leaves[i]);
     }
   });
   std::size_t perforated = 0;

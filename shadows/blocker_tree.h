@@ -40,6 +40,7 @@ struct BlockerTree {
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
+    std::uint32_t vertices = 0;
     std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0, perforated = 0;
     vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
   };

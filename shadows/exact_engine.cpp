@@ -136,10 +136,17 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const std::vector<std::uint32_t>& order = work.order;
   if (order.empty()) return;
   KernelReceivers& kernel = work.receivers;
-  gather_receivers(receivers, order, masks.words_per_receiver, kernel);
-  stats.index_ms += watch.lap();
   const KernelSamples& samples = kept.samples;
   const SampleRows& rows = kept.rows;
+  if (rows.empty()) {
+    gather_receivers(receivers, order, masks.words_per_receiver, kernel);
+  } else {  // bits are in the order of the samples: no masks but the caller's
+    gather_receivers(receivers, order, 0, kernel);
+    kernel.words = masks.words_per_receiver;
+    kernel.mask_at.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
+  }
+  stats.index_ms += watch.lap();
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
   const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
@@ -160,7 +167,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
       }
     });
   }
-  scatter_masks(kernel, samples, order, masks);
+  if (rows.empty()) scatter_masks(kernel, samples, order, masks);
   add_counters(scratches, stats);
   stats.bytes =
       std::max<std::uint64_t>(stats.bytes, side.tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
@@ -194,7 +201,7 @@ void ExactWork::reserve(std::size_t count, std::size_t words) {
   morton.keys.reserve(count), morton.scratch.reserve(count), order.reserve(count);
   receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
   receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
-  receivers.masks.reserve(count * words);
+  receivers.masks.reserve(count * words), receivers.mask_at.reserve(count);
 }
 
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {
