@@ -1,6 +1,7 @@
 // Chooses the method and runs it on receivers that exist already.
 #pragma once
 
+#include "halfshade/names.h"
 #include "halfshade/shadows.h"
 #include "shadows/receivers.h"
 
@@ -30,11 +31,5 @@ void visibility_of(const VisibilityMasks& masks, std::vector<float>& visibility)
 /// Asks whoever watches the current call, or config.progress outside of any; throws Error{kCancelled} when told to
 /// stop.
 void report_progress(const ShadowConfig& config, double done);
-
-/// "exact", "afsm" ...; throws Error{kUsage} listing the known names.
-ShadowMethod shadow_method_from_name(const std::string& name);
-const char* name_of(ShadowMethod method);
-SamplePattern sample_pattern_from_name(const std::string& name);
-const char* name_of(SamplePattern pattern);
 
 }  // namespace halfshade

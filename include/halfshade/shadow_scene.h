@@ -61,7 +61,7 @@ struct MeshTriangle {
 /// Threads: const member functions may run concurrently with each other and with solves; others may not run
 /// concurrently with anything on the same scene. Errors are thrown before anything changes, std::bad_alloc as well; a
 /// commit() that throws leaves the scene uncommitted, with all noted changes, and may be called again.
-class ShadowScene {
+class HALFSHADE_API ShadowScene {
  public:
   explicit ShadowScene(const SceneConfig& config = {});
   ~ShadowScene();
@@ -101,7 +101,7 @@ class ShadowScene {
 
   const SceneStats& stats() const;
 
-  struct Impl;
+  struct HALFSHADE_LOCAL Impl;
   const Impl& impl() const { return *impl_; }  // for the library's own use
 
  private:

@@ -64,7 +64,7 @@ struct WorkspaceConfig {
 /// are not flat, receivers in the plane of a light, and other methods allocate as they need.
 /// Distinct Workspaces may be used concurrently; one Workspace may not: a call that finds it in use throws
 /// Error{kUsage}.
-class Workspace {
+class HALFSHADE_API Workspace {
  public:
   explicit Workspace(const WorkspaceConfig& config = {});
   ~Workspace();
@@ -77,7 +77,7 @@ class Workspace {
   /// Of the last call that returned or threw.
   const SolveStats& stats() const;
 
-  struct Impl;
+  struct HALFSHADE_LOCAL Impl;
   Impl& impl() { return *impl_; }  // for the library's own use
 
  private:
@@ -91,7 +91,7 @@ class Workspace {
 ///
 /// The floating-point environment of the calling thread, and of all threads that help, is saved, set to round to
 /// nearest with denormals, and restored.
-class ShadowSolver {
+class HALFSHADE_API ShadowSolver {
  public:
   /// Throws Error{kUsage} for a configuration out of range, and for method raytrace, which is not in the library.
   /// config.progress is called if the Execution of a call has none. For method exact, back_face_casters is the scene's.
