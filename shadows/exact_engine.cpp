@@ -13,7 +13,7 @@ namespace halfshade {
 namespace {
 
 constexpr std::size_t kCluster = 128;  // receivers that share a list of leaves
-constexpr std::size_t kClustersPerTask = 8;
+constexpr std::size_t kClustersPerTask = 2;
 
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
 constexpr double kGrazing = 1e-5;
@@ -151,7 +151,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   stats.cull_ms += watch.lap();
   const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
   const auto solve = rows.empty() ? solve_cluster : solve_packets;
-  constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
+  constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch>& scratches = work.scratches;
   scratches.resize(kTasksPerRound);
