@@ -198,7 +198,8 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 void ExactWork::reserve(std::size_t count, std::size_t words) {
   const std::size_t padded = count + KernelReceivers::kLanePadding;
-  morton.keys.reserve(count), morton.scratch.reserve(count), order.reserve(count);
+  morton.reserve(count);
+  order.reserve(count);
   receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
   receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
   receivers.masks.reserve(count * words), receivers.mask_at.reserve(count);

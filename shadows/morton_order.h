@@ -19,6 +19,8 @@ struct MortonScratch {
   using Key = std::pair<std::uint32_t, std::uint32_t>;  // code, index
   std::vector<Key> keys, scratch;
   RadixCounts counts;
+
+  void reserve(std::size_t count) { keys.reserve(count), scratch.reserve(count), counts.reserve(count); }
 };
 
 /// Indices of the points for which keep(index) holds, by their place among 1024^3 cells of the box around all points;

@@ -10,7 +10,14 @@ namespace halfshade {
 
 /// Counts of digits, kept so that sorting again allocates nothing.
 struct RadixCounts {
+  static constexpr int kDigitBits = 11;
+  static constexpr std::size_t kDigits = std::size_t{1} << kDigitBits, kPart = 1 << 16;
   std::vector<std::uint32_t> counts, offsets;  // [digit][part]: a part's items come after those of the parts before it
+
+  void reserve(std::size_t items) {
+    const std::size_t most = kDigits * ((items + kPart - 1) / kPart);
+    counts.reserve(most), offsets.reserve(most + 1);
+  }
 };
 
 /// Sorts `items` by key(item) < key_end; items of equal keys keep their order, so the result is the same for any number
@@ -18,8 +25,8 @@ struct RadixCounts {
 template <class Item, class Key>
 void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, std::uint32_t key_end, const Key& key,
                          RadixCounts& kept) {
-  constexpr int kDigitBits = 11;
-  constexpr std::size_t kDigits = std::size_t{1} << kDigitBits, kPart = 1 << 16;
+  constexpr int kDigitBits = RadixCounts::kDigitBits;
+  constexpr std::size_t kDigits = RadixCounts::kDigits, kPart = RadixCounts::kPart;
   const std::size_t parts = (items.size() + kPart - 1) / kPart;
   auto& [counts, offsets] = kept;
   scratch.resize(items.size());
