@@ -55,6 +55,7 @@ void Workspace::clear() {
 std::uint64_t Workspace::bytes() const {
   std::uint64_t bytes =
       bytes_of(impl_->receivers) + bytes_of(impl_->lit) + bytes_of(impl_->masks.words) + bytes_of(impl_->visibility);
+  bytes += bytes_of(impl_->exact);
   for (const KeptLight& kept : impl_->lights) bytes += bytes_of(kept);
   return bytes;
 }
