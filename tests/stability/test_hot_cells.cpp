@@ -107,9 +107,9 @@ void check_crowd(int count) {
   const ShadowConfig config = frame_config(64);
   for (const ShadowMethod method : exact_methods()) {
     const double ms = time_of(method, scene, dense, config), usual = time_of(method, scene, spread, config);
-    MESSAGE(traits_of(method).name << ": " << count << " receivers in one place " << ms << " ms, spread out " << usual
-                                   << " ms");
-    CAPTURE(traits_of(method).name);
+    MESSAGE(std::string(traits_of(method).name)
+            << ": " << count << " receivers in one place " << ms << " ms, spread out " << usual << " ms");
+    CAPTURE(std::string(traits_of(method).name));
     CHECK(ms <= 4.0 * usual + 20.0);
   }
 }

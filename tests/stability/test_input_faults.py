@@ -27,7 +27,7 @@ SANITIZED = "HALFSHADE_SANITIZED" in os.environ
 
 
 class Outcome:
-    """`seconds` of processor time; a program that waits for ever is killed after 60 s and has no exit code."""
+    """`seconds` of processor time; a program that waits for ever is killed after four minutes."""
     def __init__(self, code, stderr, seconds, peak_mib):
         self.code, self.stderr, self.seconds, self.peak_mib = code, stderr, seconds, peak_mib
 
@@ -36,7 +36,7 @@ def run(*arguments, wrapper=()):
     with tempfile.TemporaryFile() as errors:
         process = subprocess.Popen([*wrapper, PROGRAM, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=errors,
                                    stdin=subprocess.DEVNULL)
-        watchdog = threading.Timer(60.0, process.kill)
+        watchdog = threading.Timer(240.0, process.kill)
         watchdog.start()
         _, status, usage = os.wait4(process.pid, 0)
         watchdog.cancel()

@@ -132,7 +132,7 @@ TEST_CASE("S09 lone_plane_acne: neither a tilted plane nor the lit side of a sph
   check_acne(500, 50000, 200);
 }
 
-TEST_CASE("S09_long lone_plane_acne: a million receivers on the plane") { check_acne(2200, 1000000, 600); }
+TEST_CASE("S09_long lone_plane_acne: a million receivers on the plane") { check_acne(2400, 1000000, 600); }
 
 TEST_CASE("S09 lone_plane_acne: the sphere's bits are those of integers") {
   for (const StabilityCase& c : stability_cases()) {
@@ -179,7 +179,7 @@ TEST_CASE("S12 receiver_behind_light: receivers at and behind a one-sided light 
     config.method = traits.method;
     std::vector<float> visibility;
     solve_visibility(scene_of(plate(2)), receivers_at(points), frame_light(), config, visibility);
-    CAPTURE(traits.name);
+    CAPTURE(std::string(traits.name));
     for (const float v : visibility) CHECK(v == 0.0f);
   }
 }
@@ -272,7 +272,7 @@ TEST_CASE("S16 zero_light: every other method gives numbers from 0 to 1 as well"
         config.method = traits.method;
         std::vector<float> visibility;
         solve_visibility(scene_of(triangles), receivers_at(floor_points(7, 4.9)), tiny, config, visibility);
-        CAPTURE(traits.name);
+        CAPTURE(std::string(traits.name));
         CAPTURE(side);
         for (const float v : visibility) CHECK((v >= 0.0f && v <= 1.0f));
       }
@@ -349,7 +349,7 @@ TEST_CASE(
       const int i = entry % 8, k = entry / 8;  // u = i / 8, v = k / 8: even ones on a border
       const dvec3 r(i / 4.0 - 1.0, 0.0, k / 4.0 - 1.0);
       const int alpha = 17 * (4 * (3 - k / 2) + i / 2);
-      const bool opaque = static_cast<float>(alpha) / 255.0f >= cutoff;
+      const bool opaque = alpha >= 255.0 * static_cast<double>(cutoff);  // exactly; float(119 / 255) is above 119 / 255
       CAPTURE(cutoff);
       CAPTURE(entry);
       for (const ShadowMethod method : exact_methods()) {

@@ -131,14 +131,14 @@ class S25(Case):
         return scene.write(self.directory / "swarm.obj")
 
     def test_a_swarm_at_the_light_stays_within_512_mib_and_has_no_wrong_bit(self):
-        path = self.swarm(1000000 if LONG else 10000)
+        path = self.swarm(100000 if LONG else 10000)
         if LONG:  # the scene alone takes more: what the method adds counts
             budget, share = 512 + 64 + self.render(path, "--size", "16x16", "--light-samples", 1)[2], "0.02"
         else:
             budget, share = 512 + 64, "0.2"
         for coarse in ("true", "false"):
             with self.subTest(coarse=coarse):
-                out, _, peak = self.render(path, "--size", "256x256", "--light-samples", 16, "--method", "gears", "--set",
+                out, _, peak = self.render(path, "--size", "128x128", "--light-samples", 16, "--method", "gears", "--set",
                                            "gears.grid=128", "--set", f"gears.coarse={coarse}", "--verify", share,
                                            "--probes", 0)
                 self.assertRegex(out, r"verify +[1-9]\d* receivers, \d+ bits, 0 wrong")

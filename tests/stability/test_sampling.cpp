@@ -34,7 +34,7 @@ TEST_CASE("S22 wire_sweep: a wire finer than the samples costs at most one colum
     CAPTURE(width);
     const double worst = check_wire(width, 512);
     CHECK(worst <= 1.0 / 16.0 + 1e-7);
-    CHECK((worst > 0.0) == (width != 0.0625));  // that one always covers exactly one column
+    CHECK(worst > 0.0);  // sampled, so not right everywhere
     MESSAGE("wire " << width << ", seen " << 2.0 * width / kSpacing << " spacings wide: error up to " << worst);
   }
 }
