@@ -29,7 +29,7 @@ using nlohmann::ordered_json;
 struct RenderOptions : PipelineOptions {
   std::string output, json, dump;
   double verify_percent = 0.0;
-  std::uint32_t probes = 256;
+  std::uint32_t probes = 64;
   bool stats = false, stream = false;
   StreamRenderOptions streamed;  // what only --stream knows
 };

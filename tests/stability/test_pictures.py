@@ -113,7 +113,7 @@ class S22(Case):
             scene.quad((-width / 2, 2, -4.5), (width / 2, 2, -4.5), (width / 2, 2, 4.5), (-width / 2, 2, 4.5))
             path = scene.write(self.directory / "wire.obj")
             with self.subTest(width=width):
-                _, errors, _ = self.render(path, "--size", "96x96", "--pattern", "uniform")
+                _, errors, _ = self.render(path, "--size", "96x96", "--pattern", "uniform", "--probes", 256)
                 warned = "warning: light 'frame'" in errors and "narrower than the distance between its 256" in errors
                 self.assertEqual(warned, 2 * width < 0.125, errors)
                 self.assertEqual(self.render(path, "--size", "16x16", "--probes", 0)[1], "")
