@@ -17,6 +17,7 @@
 #include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
+#include "shadows/thin_features.h"
 #include "shadows/transmittance.h"
 #include "stats_json.h"
 
@@ -28,6 +29,7 @@ using nlohmann::ordered_json;
 struct RenderOptions : PipelineOptions {
   std::string output, json, dump;
   double verify_percent = 0.0;
+  std::uint32_t probes = 64;
   bool stats = false, stream = false;
   StreamRenderOptions streamed;  // what only --stream knows
 };
@@ -39,7 +41,8 @@ struct LightResult {
   VisibilityMasks masks;                   // empty for methods without masks
   std::vector<float> receiver_visibility;  // [receiver]
   ShadowStats stats;
-  double samples_ms = 0.0, shadow_ms = 0.0;
+  double samples_ms = 0.0, shadow_ms = 0.0, probe_ms = 0.0;
+  ThinFeatures thin;                   // finer than the samples, as the probes see them
   std::vector<float> visibility;       // [G-buffer entry]
   std::vector<vec3> visible_emission;  // [G-buffer entry], with an emission image or translucent triangles
   std::vector<vec3> reaching;          // [receiver] through translucent triangles, if there are any
@@ -132,6 +135,23 @@ void verify(const Render& render, const Light& light, LightResult& result) {
   result.rms_error = std::sqrt(result.rms_error);
 }
 
+/// Says so where at least one probe in a hundred sees features that the light's samples are too far apart for.
+void look_for_thin_features(const Render& render, const Light& light, ShadowConfig config, LightResult& result) {
+  if (!yields_masks(config)) return;
+  Stopwatch watch;
+  Progress progress("features of " + light.name, true);
+  config.progress = [&progress](double done) { return progress(done); };
+  result.thin = find_thin_features(render.mesh, result.receivers, result.receiver_visibility, light, config,
+                                   render.options.probes);
+  result.probe_ms = watch.lap();
+  if (result.thin.seeing == 0 || result.thin.share() < 0.01) return;
+  fmt::print(stderr,
+             "halfshade: warning: light '{}': {} of {} probed points see something narrower than the distance between "
+             "its {} samples, on {:.1f} % of the light; more --light-samples would resolve it\n",
+             light.name, result.thin.seeing, result.thin.probes, result.samples.count,
+             100.0 * result.thin.share_of_light);
+}
+
 void solve_light(Render& render, const Light& light) {
   const RenderOptions& options = render.options;
   ShadowConfig config = shadow_config(options);
@@ -148,6 +168,7 @@ void solve_light(Render& render, const Light& light) {
     spread_transmitted(render, light, config, result);
   }
   result.shadow_ms = watch.lap();
+  look_for_thin_features(render, light, config, result);
   spread_visibility(render.gbuffer, result);
   if (render.panes.empty()) spread_emission(render.gbuffer, light.emission_image, result);
   if (options.verify_percent > 0.0) verify(render, light, result);
@@ -204,6 +225,11 @@ ordered_json light_json(const Render& render, std::size_t index) {
                        {"receivers_penumbra", light.penumbra},
                        {"receivers_umbra", light.umbra},
                        {"mask_bytes", light.masks.words.size() * 8}};
+  if (light.thin.probes > 0)
+    json["thin_features"] = {{"probes", light.thin.probes},
+                             {"probes_seeing", light.thin.seeing},
+                             {"share_of_light", light.thin.share_of_light},
+                             {"probe_ms", light.probe_ms}};
   const std::string assumptions = method_assumptions(shadow_config(render.options), render.source.view.lights[index]);
   if (!assumptions.empty()) json["assumes"] = assumptions;
   if (!light.masks.words.empty()) json["mask_hash"] = light.masks.hash();
@@ -393,6 +419,10 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code) 
   verb->add_option("--json", o->json, "Statistics as JSON to this file, or - for standard output");
   verb->add_option("--dump", o->dump, "Write receivers, samples, triangles and masks into this directory");
   verb->add_option("--verify", o->verify_percent, "Check this percentage of the receivers with the oracle")
+      ->capture_default_str();
+  verb->add_option("--probes", o->probes,
+                   "Receivers that look for features finer than the light's samples, and warn (0 = none)")
+      ->check(CLI::Range(0, 65536))
       ->capture_default_str();
   verb->add_flag("--stats", o->stats, "Print every counter of the method");
   verb->add_flag("--stream", o->stream, "Never hold the whole scene: method hpc, blockers sorted into files on disk");

@@ -197,7 +197,7 @@ PixelPoint beyond_edge(Random& random, const PixelPoint& a, const PixelPoint& b,
 }  // namespace
 
 TEST_CASE("S33 shared_edge_raster: a shared edge is covered by exactly one triangle, pixel centre by pixel centre") {
-  constexpr int kPairs = 990000;
+  constexpr int kPairs = 1000000;
   Random random(33);
   static CoverageCount coverage;
   std::uint64_t wrong = 0, covered = 0, first_wrong_pair = 0;
@@ -271,7 +271,7 @@ bool oracle_covers(Fx8Point a, Fx8Point b, Fx8Point c, const Fx8Point& p) {
 
 }  // namespace
 
-TEST_CASE("holes and double coverage at T-junctions are exactly those of the scalar oracle") {
+TEST_CASE("S33 shared_edge_raster: holes and double coverage at T-junctions are exactly those of the scalar oracle") {
   Random random(35);
   static CoverageCount coverage;
   std::uint64_t wrong = 0, holes = 0;

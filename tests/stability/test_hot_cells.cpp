@@ -1,7 +1,9 @@
 // Named stability cases about cells that too many blockers ask for.
 #include <doctest/doctest.h>
 
-#include "support/lit_scene.h"
+#include "rasterizer/core/stopwatch.h"
+#include "stability/cases.h"
+#include "stability/integer_oracle.h"
 
 using namespace halfshade;
 using namespace halfshade::test;
@@ -67,3 +69,65 @@ TEST_CASE("S25 hot_cell_memory: gears: memory grows with the swarm's size, not w
   CHECK(bytes[0] < 100e6);
   CHECK(bytes[1] < 2.1 * bytes[0]);
 }
+
+namespace {
+
+const std::vector<Triangle>& furniture() {
+  static const std::vector<Triangle> triangles = joined(plate(2), box({-2, 0.5, -2}, {-1, 1.0, 2}));
+  return triangles;
+}
+
+/// All but one of `count` receivers within 10^-4 of the origin, or spread over the floor.
+std::vector<Receiver> crowd(int count, bool dense) {
+  Random random(24);
+  std::vector<dvec3> points;
+  for (int i = 1; i < count; ++i) {
+    points.push_back(dense ? 1e-4 * random.in_box(-1, 1) : dvec3(random.uniform(-4, 4), 0, random.uniform(-4, 4)));
+  }
+  points.push_back({100, 0, 0});
+  return receivers_at(points);
+}
+
+/// Milliseconds: the fastest of three solves.
+double time_of(ShadowMethod method, const Scene& scene, const std::vector<Receiver>& receivers,
+               const ShadowConfig& config) {
+  double fastest = 1e30;
+  for (int run = 0; run < 3; ++run) {
+    Stopwatch watch;
+    solve(scene, receivers, frame_light(), config, method);
+    fastest = std::min(fastest, watch.lap());
+  }
+  return fastest;
+}
+
+/// Time and memory for a crowd in one place are at most four times those for the same number spread out.
+void check_crowd(int count) {
+  const Scene scene = scene_of(furniture());
+  const std::vector<Receiver> dense = crowd(count, true), spread = crowd(count, false);
+  const ShadowConfig config = frame_config(64);
+  for (const ShadowMethod method : exact_methods()) {
+    const double ms = time_of(method, scene, dense, config), usual = time_of(method, scene, spread, config);
+    MESSAGE(std::string(traits_of(method).name)
+            << ": " << count << " receivers in one place " << ms << " ms, spread out " << usual << " ms");
+    CAPTURE(std::string(traits_of(method).name));
+    CHECK(ms <= 4.0 * usual + 20.0);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("S24 coincident_receivers: many equal receivers, or all in one cell, are handled") {
+  const Scene scene = scene_of(furniture());
+  const std::vector<Receiver> equal = receivers_at(std::vector<dvec3>(5000, dvec3(0.0)));
+  CHECK(wrong_against_integers(scene, equal, frame_light(), frame_config(64)) == 0);
+  CHECK(wrong_against_integers(scene, crowd(3000, true), frame_light(), frame_config(64)) == 0);
+  ShadowStats stats;
+  solve(scene, equal, frame_light(), frame_config(64), ShadowMethod::kHierarchicalPenumbraCasting, &stats);
+  CHECK(stats.detail("hpc.hierarchy_depth").value() <= 64.0);
+}
+
+TEST_CASE("S24 coincident_receivers: a crowd in one place takes at most four times as long as one spread out") {
+  check_crowd(50000);
+}
+
+TEST_CASE("S24_long coincident_receivers: a million receivers in one place") { check_crowd(1000000); }
