@@ -8,6 +8,9 @@
 #include "progress.h"
 #include "verbs.h"
 
+namespace halfshade {
+void add_atlas(CLI::App& app, const std::string& command_line, int& exit_code);
+}
 namespace {
 
 int exit_code_of(halfshade::ErrorCode code) {
@@ -42,6 +45,7 @@ int run(int argc, char** argv) {
   halfshade::add_render(app, joined(argc, argv), exit_code);
   halfshade::add_accumulate(app, joined(argc, argv));
   halfshade::add_chart(app, joined(argc, argv));
+  halfshade::add_atlas(app, joined(argc, argv), exit_code);
   halfshade::add_info(app);
   halfshade::add_compare(app, exit_code);
   halfshade::add_verify(app, exit_code);

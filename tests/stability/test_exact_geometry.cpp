@@ -8,6 +8,7 @@
 
 using namespace halfshade;
 using namespace halfshade::test;
+using halfshade::cases::half_plane;
 
 namespace {
 
@@ -141,9 +142,6 @@ TEST_CASE("S02 edge_aim: an exact hit of an edge blocks, one lattice unit beside
 
 namespace {
 
-/// The half-plane y = 2, x <= 0 of the stability cases.
-std::vector<Triangle> half_plane() { return quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}); }
-
 std::vector<dvec3> half_plane_receivers() {
   std::vector<dvec3> points;
   for (int i = -64; i <= 64; ++i) points.push_back({i / 64.0, 0.0, 0.25});
@@ -199,18 +197,6 @@ TEST_CASE("S05 sliver_grazing: slivers of aspect 10^2 to 10^8 at grazing angles 
 
 namespace {
 
-std::vector<Triangle> scattered_triangles(std::uint64_t seed, int count) {
-  Random random(seed);
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const dvec3 c = random.in_box(-4.0, 3.5);
-    Triangle t;
-    for (dvec3& p : t) p = glm::round((c + random.in_box(-0.7, 0.7)) * 1024.0) / 1024.0;
-    triangles.push_back(t);
-  }
-  return triangles;
-}
-
 struct Moved {
   Scene scene;
   std::vector<Receiver> receivers;
@@ -231,7 +217,7 @@ Moved moved(const std::vector<Triangle>& triangles, const std::vector<dvec3>& po
 }  // namespace
 
 TEST_CASE("S06 far_origin: moving the scene by offsets that stay exact in double changes no bit") {
-  const std::vector<Triangle> triangles = joined(half_plane(), scattered_triangles(6, 1000));
+  const std::vector<Triangle> triangles = joined(half_plane(), cases::scattered(6, 1000));
   const std::vector<dvec3> points = half_plane_receivers();
   const Moved home = moved(triangles, points, dvec3(0.0), 1.0);
   for (const ShadowMethod method : exact_methods()) {
@@ -245,7 +231,7 @@ TEST_CASE("S06 far_origin: moving the scene by offsets that stay exact in double
 }
 
 TEST_CASE("S06 far_origin: offsets that round change at most 0.1 percent of the bits") {
-  std::vector<Triangle> triangles = scattered_triangles(7, 300);
+  std::vector<Triangle> triangles = cases::scattered(7, 300);
   for (Triangle& t : triangles) {
     for (dvec3& p : t) p *= 1.0 / 3.0;
   }
@@ -259,7 +245,7 @@ TEST_CASE("S06 far_origin: offsets that round change at most 0.1 percent of the 
 }
 
 TEST_CASE("S07 scale: scaling by powers of two from 2^-60 to 2^60 changes no bit") {
-  const std::vector<Triangle> triangles = joined(half_plane(), scattered_triangles(8, 200));
+  const std::vector<Triangle> triangles = joined(half_plane(), cases::scattered(8, 200));
   const std::vector<dvec3> points = half_plane_receivers();
   const Moved home = moved(triangles, points, dvec3(0.0), 1.0);
   const VisibilityMasks masks =

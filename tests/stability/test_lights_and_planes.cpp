@@ -13,6 +13,7 @@
 
 using namespace halfshade;
 using namespace halfshade::test;
+using halfshade::cases::plate;
 
 namespace {
 
@@ -29,8 +30,6 @@ std::uint64_t wrong_in_frame(const std::vector<Triangle>& triangles, const std::
                              const Light& light = frame_light(), const ShadowConfig& config = frame_config()) {
   return wrong_bits_of_exact_methods(scene_of(triangles), receivers_at(points), light, config);
 }
-
-std::vector<Triangle> plate(double y) { return quad({-1, y, -1}, {1, y, -1}, {1, y, 1}, {-1, y, 1}); }
 
 ShadowStats stats_of(const std::vector<Triangle>& triangles, const std::vector<dvec3>& points) {
   ShadowStats stats;
@@ -127,10 +126,9 @@ TEST_CASE("S09 lone_plane_acne: a convex sphere does not block samples above a f
 }
 
 TEST_CASE("S10 behind_light_vertex: a triangle that reaches through the light's plane hides the receiver beyond it") {
-  const std::vector<Triangle> crossing = {{dvec3(2, 3, 0), dvec3(2, 5, 0.5), dvec3(2, 3, 1)}};
   std::vector<dvec3> points = {{20, 0, 0.5}};
-  const VisibilityMasks masks =
-      solve(scene_of(crossing), receivers_at(points), frame_light(), frame_config(), ShadowMethod::kAliasFreeShadowMap);
+  const VisibilityMasks masks = solve(scene_of(cases::through_light_plane()), receivers_at(points), frame_light(),
+                                      frame_config(), ShadowMethod::kAliasFreeShadowMap);
   CHECK(masks.blocked_count(0) > 0);
   Random random(10);
   for (int i = 0; i < 40; ++i)
@@ -144,7 +142,7 @@ TEST_CASE("S10 behind_light_vertex: a triangle that reaches through the light's 
 
 TEST_CASE("S11 light_in_triangle: coplanar triangles block nothing, piercing ones exactly, at bounded cost") {
   const std::vector<Triangle> coplanar = {{dvec3(-2, 4, 0), dvec3(2, 4, 0), dvec3(0, 4, 2)}};
-  const std::vector<Triangle> piercing = {{dvec3(-0.5, 3, 0), dvec3(0.5, 5, 0), dvec3(0, 4, 1)}};
+  const std::vector<Triangle> piercing = cases::piercing_light();
   const std::vector<Triangle> below = {{dvec3(-0.5, 3, 0), dvec3(0.5, 3, 0), dvec3(0, 3, 1)}};
   const std::vector<dvec3> points = floor_points(40, 6.0);
   const VisibilityMasks masks =
@@ -191,7 +189,7 @@ TEST_CASE("S14 inside_room: a room seen from inside does not depend on its windi
 }
 
 TEST_CASE("S15 open_mesh_winding: an open quad blocks from both sides, whatever its winding") {
-  auto card = quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64});
+  auto card = cases::half_plane();
   const auto points = floor_points(11, 1.0);
   const auto run = [&](bool two_sided) {
     Light light = frame_light();
@@ -246,7 +244,7 @@ TEST_CASE("S17 N_sweep: any number of samples from 1 to 4096") {
 }
 
 TEST_CASE("S18 both_sides_lit: a triangle whose plane holds the light's centre shadows both sides alike") {
-  const std::vector<Triangle> t = {{dvec3(0, 1, -1), dvec3(0, 1, 1), dvec3(0, 3, 0)}};
+  const std::vector<Triangle> t = cases::both_sides_lit();
   for (const ShadowMethod method : {ShadowMethod::kAliasFreeShadowMap, ShadowMethod::kExact, ShadowMethod::kOracle}) {
     const VisibilityMasks masks =
         solve(scene_of(t), receivers_at({{0.5, 0, 0}, {-0.5, 0, 0}}), frame_light(), frame_config(), method);

@@ -8,8 +8,7 @@ using namespace halfshade;
 using namespace halfshade::test;
 
 TEST_CASE("S04 split_quad: a segment through the edge that two quads share counts one surface") {
-  const auto halves = joined(quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}),
-                             quad({0, 2, -64}, {64, 2, -64}, {64, 2, 64}, {0, 2, 64}));
+  const auto halves = joined(cases::half_plane(), quad({0, 2, -64}, {64, 2, -64}, {64, 2, 64}, {0, 2, 64}));
   std::vector<dvec3> points;
   for (int i = -64; i <= 64; ++i) points.push_back({i / 64.0, 0.0, (i % 16) / 16.0});
   const DepthComplexity depth = depth_of(scene_of(halves), points, 256);
@@ -22,9 +21,7 @@ TEST_CASE("S04 split_quad: a segment through the edge that two quads share count
 
 TEST_CASE("S28 wedge_overlap: two quads that hide the same half of the light leave the other half") {
   // Both hide the samples with x < 0 from the origin.
-  const auto quads = joined(quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}),
-                            quad({-64, 2.5, -64}, {0, 2.5, -64}, {0, 2.5, 64}, {-64, 2.5, 64}));
-  const DepthComplexity depth = depth_of(scene_of(quads), {{0, 0, 0}}, 256);
+  const DepthComplexity depth = depth_of(scene_of(cases::double_cover()), {{0, 0, 0}}, 256);
   CHECK(depth.visibility(0) == 0.5f);
   std::uint32_t sum = 0;
   for (const std::uint32_t count : depth.counts) sum += count;
@@ -32,16 +29,6 @@ TEST_CASE("S28 wedge_overlap: two quads that hide the same half of the light lea
 }
 
 namespace {
-
-/// B6: bars of a period of 1/64, half of it opaque, at y = 3.5.
-Scene bars() {
-  Scene scene = scene_of(quad({-16, 3.5, -16}, {16, 3.5, -16}, {16, 3.5, 16}, {-16, 3.5, 16}));
-  scene.alpha_maps.push_back({"bars", 2, 1, {255, 0}});
-  scene.materials[0].alpha_map = 0;
-  const float repeats = 32.0f * 64.0f;
-  scene.triangle_uvs = {{vec2(0, 0), vec2(repeats, 0), vec2(repeats, 1)}, {vec2(0, 0), vec2(repeats, 1), vec2(0, 1)}};
-  return scene;
-}
 
 std::vector<dvec3> sweep_points() {  // one period of the shadow: the bars' own, times 4 / 0.5
   std::vector<dvec3> points;
@@ -64,7 +51,7 @@ std::vector<float> visibility_of(const Scene& scene, const std::vector<dvec3>& p
 }  // namespace
 
 TEST_CASE("S21 fence_minify: bars finer than the samples: nearest is the oracle's, filtered does not flicker") {
-  const Scene scene = bars();
+  const Scene scene = cases::bars();
   const std::vector<dvec3> points = sweep_points();
   ShadowConfig config = frame_config(256);
   CHECK(wrong_bits_of_exact_methods(scene, receivers_at(points), frame_light(), config) == 0);

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "rasterizer/bent_normals.h"
-#include "rasterizer/core/unit_circle.h"
 #include "rasterizer/rasterizer.h"
 #include "rasterizer/shading.h"
 #include "shadows/solver.h"
@@ -14,53 +13,11 @@
 
 using namespace halfshade;
 using namespace halfshade::test;
+using halfshade::cases::grazing_light;
 
 namespace {
 
 constexpr std::uint32_t kSide = 1536;
-
-/// Sphere of radius 1 about the origin with its poles on the y axis; normals of the true sphere.
-Scene uv_sphere(std::uint32_t segments, std::uint32_t rings) {
-  Scene scene;
-  scene.materials.emplace_back().diffuse = vec3(1.0f);
-  scene.positions = {{0, -1, 0}, {0, 1, 0}};
-  for (std::uint32_t ring = 1; ring < rings; ++ring) {
-    for (std::uint32_t s = 0; s < segments; ++s) {
-      const dvec2 around = unit_circle((s + 0.25) / segments), up = unit_circle(0.5 * ring / rings);
-      scene.positions.push_back({up.y * around.x, -up.x, -up.y * around.y});
-    }
-  }
-  const auto vertex = [&](std::uint32_t ring, std::uint32_t s) {
-    if (ring == 0 || ring == rings) return ring == 0 ? 0u : 1u;
-    return 2 + (ring - 1) * segments + s % segments;
-  };
-  for (std::uint32_t ring = 0; ring < rings; ++ring) {
-    for (std::uint32_t s = 0; s < segments; ++s) {
-      const std::uint32_t a = vertex(ring, s), b = vertex(ring, s + 1), c = vertex(ring + 1, s + 1),
-                          d = vertex(ring + 1, s);
-      if (ring > 0) scene.triangles.push_back({a, b, c});
-      if (ring + 1 < rings) scene.triangles.push_back({a, c, d});
-      if (ring == 0) scene.triangles.back() = {a, c, d};
-    }
-  }
-  for (const auto& t : scene.triangles) {
-    scene.triangle_materials.push_back(0);
-    scene.triangle_normals.push_back(
-        {vec3(scene.positions[t[0]]), vec3(scene.positions[t[1]]), vec3(scene.positions[t[2]])});
-  }
-  return scene;
-}
-
-/// A small light 85 degrees away from the camera's direction: the terminator passes through the middle of the picture.
-Light grazing_light(double size = 0.2) {
-  const dvec2 angle = unit_circle(85.0 / 360.0);
-  Light light;
-  light.center = dvec3(angle.y, 0.1, angle.x) * 12.0;
-  light.u = {0.0, size, 0.0};
-  light.v = {-size * angle.x, 0.0, size * angle.y};
-  light.two_sided = true;
-  return light;
-}
 
 struct Lit {
   Scene scene;
@@ -70,7 +27,7 @@ struct Lit {
 };
 
 void light_sphere(std::uint32_t segments, std::uint32_t rings, const Light& light, Lit& lit) {
-  lit.scene = uv_sphere(segments, rings);
+  lit.scene = cases::smooth_sphere(segments, rings);
   lit.mesh = make_lattice_mesh(lit.scene, make_local_frame(lit.scene.positions, light_extent(light)));
   Camera camera;
   camera.eye = {0.0, 0.4, 6.0};
