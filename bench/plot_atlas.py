@@ -41,6 +41,10 @@ def caption(entry, answer):
 def show(axes, directory, image, title):
     axes.imshow(pyplot.imread(directory / image), cmap="gray", vmin=0, vmax=1, interpolation="nearest", aspect="auto")
     axes.set_title(title, fontsize=6, pad=2)
+    axes.set_axis_on()
+    axes.set(xticks=[], yticks=[])
+    for spine in axes.spines.values():
+        spine.set(color="0.7", linewidth=0.5)
 
 
 def draw(atlas, rows, directory):
@@ -55,7 +59,7 @@ def draw(atlas, rows, directory):
     for axes in panels.flat:
         axes.set_axis_off()
     for (entry, answers), axes in zip(lines, panels):
-        show(axes[0], directory, entry["image"], f'{entry["title"]}\ntruth')
+        show(axes[0], directory, entry["image"], f'{entry["id"]}\ntruth')
         for k, answer in enumerate(answers):
             show(axes[1 + 2 * k], directory, answer["image"], caption(entry, answer))
             show(axes[2 + 2 * k], directory, answer["error_image"], "change" if entry["temporal"] else "error")
