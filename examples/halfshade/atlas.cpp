@@ -26,7 +26,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kSchema = "halfshade.atlas/1";
-constexpr AtlasSize kFull{96, 256, 3000}, kQuick{32, 16, 300};
+constexpr AtlasSize kFull{96, 256, 3000}, kQuick{32, 32, 300};
 
 struct AtlasOptions {
   std::string output = "out/atlas", command_line;

@@ -103,8 +103,8 @@ std::vector<vec3> linear_colors(const FloatImage& image, bool encoded) {
 /// Mean FLIP of the pictures as they look on a screen; the error of every pixel goes to options.flip_map.
 double compare_looks(const FloatImage& a, const FloatImage& b, const CompareOptions& options) {
   const auto encoded = [](const std::string& path) { return std::filesystem::path(path).extension() != ".exr"; };
-  const std::vector<float> errors = flip_errors(linear_colors(a, encoded(options.a)),
-                                                linear_colors(b, encoded(options.b)), a.width, a.height);
+  const std::vector<float> errors =
+      flip_errors(linear_colors(a, encoded(options.a)), linear_colors(b, encoded(options.b)), a.width, a.height);
   if (!options.flip_map.empty()) write_png(options.flip_map, a.width, a.height, 1, errors, false, 8, {});
   return mean_of(errors);
 }
@@ -150,7 +150,8 @@ void add_compare(CLI::App& app, int& exit_code) {
   verb->add_option("a", o->a, "Dump directory, or .png/.exr")->required();
   verb->add_option("b", o->b, "The same kind as A")->required();
   verb->add_option("--difference", o->difference, "Pictures: write the difference as a PNG");
-  verb->add_option("--flip-map", o->flip_map, "Pictures: write the FLIP error of every pixel, black 0 to white 1, as a PNG");
+  verb->add_option("--flip-map", o->flip_map,
+                   "Pictures: write the FLIP error of every pixel, black 0 to white 1, as a PNG");
   verb->add_option("--max-error", o->max_error, "Largest difference that still counts as equal")->capture_default_str();
   verb->callback([o, &exit_code] {
     const bool dumps = std::filesystem::is_directory(o->a) && std::filesystem::is_directory(o->b);

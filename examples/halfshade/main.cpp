@@ -8,9 +8,6 @@
 #include "progress.h"
 #include "verbs.h"
 
-namespace halfshade {
-void add_atlas(CLI::App& app, const std::string& command_line, int& exit_code);
-}
 namespace {
 
 int exit_code_of(halfshade::ErrorCode code) {

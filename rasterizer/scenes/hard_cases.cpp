@@ -80,13 +80,13 @@ Triangles double_cover() {
   return joined(half_plane(), upper);
 }
 
-Scene bars(double shear) {
+Scene bars() {
   Scene scene = scene_of(quad({-16, 3.5, -16}, {16, 3.5, -16}, {16, 3.5, 16}, {-16, 3.5, 16}));
   scene.alpha_maps.push_back({"bars", 2, 1, {255, 0}});
   scene.materials[0].alpha_map = 0;
-  const auto repeats = static_cast<float>(32.0 * 64.0), moved = static_cast<float>(-shear * 32.0 * 64.0);
-  const vec2 a(0, 0), b(repeats, 0), c(repeats + moved, 1), d(moved, 1);
-  scene.triangle_uvs = {{a, b, c}, {a, c, d}};
+  constexpr float kRepeats = 32.0f * 64.0f;
+  scene.triangle_uvs = {{vec2(0, 0), vec2(kRepeats, 0), vec2(kRepeats, 1)},
+                        {vec2(0, 0), vec2(kRepeats, 1), vec2(0, 1)}};
   return scene;
 }
 

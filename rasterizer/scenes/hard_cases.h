@@ -35,8 +35,8 @@ Triangles piercing_light();
 Triangles through_light_plane();
 /// Two quads, y = 2 and y = 2.5, that hide the same half of the light from the origin (B8).
 Triangles double_cover();
-/// Bars of a period of 1/64 along x, half of it opaque, at y = 3.5; `shear` moves them by that much x per z (B6).
-Scene bars(double shear = 0.0);
+/// Bars of a period of 1/64 along x, half of it opaque, at y = 3.5 (B6).
+Scene bars();
 /// Tiny triangles within 0.01 below the light (D3).
 Triangles swarm_at_light(std::uint32_t seed, int count);
 /// Of size 0.7 within [-4, 3.5]^3, corners on multiples of 1/1024: moved by large powers of two or ten they stay exact.
