@@ -11,10 +11,11 @@
 #include "chart_file.h"
 #include "chart_subject.h"
 #include "halfshade/error.h"
+#include "options_json.h"
+#include "output_files.h"
 #include "progress.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/image.h"
-#include "shadows/method_options.h"
 #include "shadows/solver.h"
 #include "stats_json.h"
 
@@ -71,18 +72,6 @@ ordered_json head_json(const ChartOptions& o) {
           {"command", o.command_line},
           {"machine", machine_json()},
           {"settings", settings_json(o)}};
-}
-
-void make_directory(const std::filesystem::path& path) {
-  std::error_code error;
-  std::filesystem::create_directories(path, error);
-  if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", path.string(), error.message()));
-}
-
-std::string file_name(const std::string& text) {
-  std::string name;
-  for (const char c : text) name += std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' ? c : '_';
-  return name;
 }
 
 void add_time(ordered_json& point, double ms) {
@@ -156,10 +145,6 @@ class LightChart {
   }
 
   ordered_json begin_point(const ChartSeries& series, const ChartPoint& point) const {
-    ordered_json set = ordered_json::object();
-    for (const MethodOption& option : method_options()) {
-      if (concerns(option, point.config.method)) set[option.name] = option.get(point.config);
-    }
     return {{"scene", options_.scene},
             {"light", light_.name},
             {"id", point.id},
@@ -167,7 +152,7 @@ class LightChart {
             {"parameter", series.parameter},
             {"label", point.label},
             {"light_samples", point.config.light_sample_count},
-            {"options", set},
+            {"options", options_json(point.config)},
             {"promises_exactness", promises_exactness(point.config)}};
   }
 

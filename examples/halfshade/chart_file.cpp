@@ -60,6 +60,7 @@ constexpr Column kColumns[] = {{"scene", "/scene"},
                                {"max", "/against_reference/max"},
                                {"mean", "/against_reference/mean"},
                                {"share_over_one_sample", "/against_reference/share_over_one_sample"},
+                               {"flip", "/against_reference/flip"},
                                {"image", "/image"}};
 
 std::string table_of(const ordered_json& points) {

@@ -9,6 +9,7 @@
 #include "rasterizer/core/hash.h"
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
+#include "rasterizer/io/flip.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
@@ -202,11 +203,17 @@ ordered_json ChartSubject::against_exact(const ShadowConfig& config, const Run& 
 ordered_json ChartSubject::against_reference(const VisibilityImage& image, std::uint32_t sample_count) {
   const VisibilityImage& truth = reference();
   Differences differences;
-  for (const std::uint32_t i : compared_) differences.add(double{image[i]} - truth[i], 1.0 / sample_count);
+  VisibilityImage seen = truth;  // pixels that are not compared do not differ
+  for (const std::uint32_t i : compared_) {
+    differences.add(double{image[i]} - truth[i], 1.0 / sample_count);
+    seen[i] = image[i];
+  }
+  const GBuffer& g = pipeline_.gbuffer;
   return {{"rmse", differences.rmse()},
           {"max", differences.worst},
           {"mean", differences.mean()},
-          {"share_over_one_sample", differences.share_large()}};
+          {"share_over_one_sample", differences.share_large()},
+          {"flip", mean_flip_of_grey(seen, truth, g.width, g.height)}};
 }
 
 ordered_json ChartSubject::measure(const ShadowConfig& config, const Run& run, VisibilityImage& image) {

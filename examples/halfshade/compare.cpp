@@ -1,20 +1,23 @@
 // halfshade compare: two dumps by their bits, or two pictures by their values.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "dump.h"
 #include "halfshade/error.h"
+#include "rasterizer/io/flip.h"
 #include "rasterizer/io/image.h"
+#include "rasterizer/io/srgb.h"
 #include "verbs.h"
 
 namespace halfshade {
 namespace {
 
 struct CompareOptions {
-  std::string a, b, difference;
+  std::string a, b, difference, flip_map;
   double max_error = 0.0;
 };
 
@@ -77,6 +80,35 @@ std::vector<double> luminance(const FloatImage& image) {
   return plane;
 }
 
+/// Linear RGB: of R, G, B where the picture has them, else of its only (or first) channel as grey. `encoded` values are
+/// sRGB codes.
+std::vector<vec3> linear_colors(const FloatImage& image, bool encoded) {
+  const std::vector<std::string>& names = image.channel_names;
+  std::array<std::size_t, 3> channel{0, 0, 0};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto found = std::find(names.begin(), names.end(), std::string(1, "RGB"[k]));
+    if (found != names.end()) channel[k] = static_cast<std::size_t>(found - names.begin());
+  }
+  std::vector<vec3> colors;
+  for (std::size_t i = 0; i < image.values.size(); i += names.size()) {
+    vec3& c = colors.emplace_back();
+    for (int k = 0; k < 3; ++k) {
+      const float value = image.values[i + channel[static_cast<std::size_t>(k)]];
+      c[k] = encoded ? decode_srgb(value) : value;
+    }
+  }
+  return colors;
+}
+
+/// Mean FLIP of the pictures as they look on a screen; the error of every pixel goes to options.flip_map.
+double compare_looks(const FloatImage& a, const FloatImage& b, const CompareOptions& options) {
+  const auto encoded = [](const std::string& path) { return std::filesystem::path(path).extension() != ".exr"; };
+  const std::vector<float> errors =
+      flip_errors(linear_colors(a, encoded(options.a)), linear_colors(b, encoded(options.b)), a.width, a.height);
+  if (!options.flip_map.empty()) write_png(options.flip_map, a.width, a.height, 1, errors, false, 8, {});
+  return mean_of(errors);
+}
+
 /// Differences as a picture: grey where equal, brighter or darker where A is.
 void write_difference(const std::string& path, const std::vector<double>& a, const std::vector<double>& b,
                       std::uint32_t width, std::uint32_t height) {
@@ -105,6 +137,7 @@ int compare_images(const CompareOptions& options) {
   fmt::print("values       {} of {} differ\n", different, a.values.size());
   fmt::print("difference   max {:g}, RMSE {:g}, PSNR {:.2f} dB, SSIM {:.5f}\n", worst, rmse,
              rmse > 0.0 ? -20.0 * std::log10(rmse) : HUGE_VAL, structural_similarity(la, lb, a.width, a.height));
+  fmt::print("FLIP         mean {:.5f}\n", compare_looks(a, b, options));
   if (!options.difference.empty()) write_difference(options.difference, la, lb, a.width, a.height);
   return worst <= options.max_error ? kOk : kDifferent;
 }
@@ -117,6 +150,8 @@ void add_compare(CLI::App& app, int& exit_code) {
   verb->add_option("a", o->a, "Dump directory, or .png/.exr")->required();
   verb->add_option("b", o->b, "The same kind as A")->required();
   verb->add_option("--difference", o->difference, "Pictures: write the difference as a PNG");
+  verb->add_option("--flip-map", o->flip_map,
+                   "Pictures: write the FLIP error of every pixel, black 0 to white 1, as a PNG");
   verb->add_option("--max-error", o->max_error, "Largest difference that still counts as equal")->capture_default_str();
   verb->callback([o, &exit_code] {
     const bool dumps = std::filesystem::is_directory(o->a) && std::filesystem::is_directory(o->b);

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "halfshade/error.h"
+#include "options_json.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/method_options.h"
 #include "shadows/opaque_mesh.h"
@@ -129,10 +130,6 @@ ShadowConfig shadow_config(const PipelineOptions& options) {
 
 nlohmann::ordered_json method_json(const PipelineOptions& o) {
   const ShadowConfig config = shadow_config(o);
-  nlohmann::ordered_json options = nlohmann::ordered_json::object();
-  for (const MethodOption& option : method_options()) {
-    if (concerns(option, config.method)) options[option.name] = option.get(config);
-  }
   return {{"name", o.method},
           {"light_samples", o.light_samples},
           {"pattern", o.pattern},
@@ -141,7 +138,7 @@ nlohmann::ordered_json method_json(const PipelineOptions& o) {
           {"rotate", o.rotate},
           {"seed", o.seed},
           {"grid_resolution", o.grid},
-          {"options", options},
+          {"options", options_json(config)},
           {"exact", promises_exactness(config)}};
 }
 

@@ -13,6 +13,7 @@ enum ExitCode { kOk = 0, kDifferent = 1, kUsage = 2, kBadInput = 3, kLimit = 4, 
 void add_render(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_accumulate(CLI::App& app, const std::string& command_line);
 void add_chart(CLI::App& app, const std::string& command_line);
+void add_atlas(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_info(CLI::App& app);
 void add_compare(CLI::App& app, int& exit_code);
 void add_verify(CLI::App& app, int& exit_code);

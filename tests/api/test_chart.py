@@ -10,7 +10,6 @@ import json
 import os
 import pathlib
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,16 +20,17 @@ import xml.etree.ElementTree
 
 PROGRAM = os.path.abspath(sys.argv.pop(1)) if len(sys.argv) > 1 else "halfshade"
 SOURCES = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(SOURCES / "tests/tools"))
+import browser  # noqa: E402
+
 OK, USAGE, BAD_INPUT = 0, 2, 3
 POINTS = ("builtin:columns", "--size", "64x64", "--methods", "exact,pcf", "--samples", "4,16", "--sweep",
           "map.resolution=64,256", "--time-limit", 60, "--quiet")
 SMALL = (*POINTS, "--repeat", 2)
 COUNT = 2 + 1 + 2  # exact with two numbers of samples; pcf by default and with two resolutions
 
-# Acts on the loaded page like a user and writes what it saw to the body.
-ACTIONS = """<script>
-const seen = {errors: []};
-addEventListener("error", event => seen.errors.push(String(event.message)));
+# Acts on the loaded page like a user and notes what it saw.
+ACTIONS = """
 const read = canvas => {  // from a copy, so that the page's own canvases stay as they are
   const copy = document.createElement("canvas");
   copy.width = canvas.width; copy.height = canvas.height;
@@ -44,35 +44,33 @@ const act = (canvas, type, u, v, more) => {
   const box = canvas.getBoundingClientRect();
   canvas.dispatchEvent(new PointerEvent(type, {clientX: box.left + u * box.width, clientY: box.top + v * box.height, pointerId: 1, bubbles: true, ...more}));
 };
-(async () => {
-  const third = document.getElementById("canvasC");
-  third.setPointerCapture = () => {};
-  await drawSlots();
-  seen.points = document.querySelectorAll(".point").length;
-  seen.canvas = brightness(third);
-  seen.line = document.querySelectorAll("#profile polyline").length;
-  act(third, "pointerdown", 0.5, 0.5); act(third, "pointermove", 0.9, 0.5); act(third, "pointerup", 0.9, 0.5);
-  await drawSlots();
-  seen.wipe = state.wipe;
-  seen.wiped = pixel(third, 0.9);
-  const before = brightness(document.getElementById("canvasA"));
-  third.dispatchEvent(new WheelEvent("wheel", {deltaY: -1, clientX: third.getBoundingClientRect().left + 5, clientY: third.getBoundingClientRect().top + 5}));
-  await drawSlots();
-  seen.zoom = state.zoom;
-  seen.zoomed = brightness(document.getElementById("canvasA")) !== before;
-  document.getElementById("mode").value = "difference";
-  await drawSlots();
-  seen.difference = document.getElementById("shown").textContent;
-  document.getElementById("mode").value = "flicker";
-  state.flicker = false; await drawSlots();
-  const shownA = brightness(third);
-  state.flicker = true; await drawSlots();
-  seen.flickers = shownA === brightness(document.getElementById("canvasA")) && shownA !== brightness(third);
-  document.querySelector(".point").dispatchEvent(new MouseEvent("mousemove", {bubbles: true}));
-  seen.tip = document.querySelector("#tip img").src.slice(0, 22);
-  document.body.dataset.seen = JSON.stringify(seen);
-})();
-</script>"""
+const third = document.getElementById("canvasC");
+third.setPointerCapture = () => {};
+await drawSlots();
+seen.points = document.querySelectorAll(".point").length;
+seen.canvas = brightness(third);
+seen.line = document.querySelectorAll("#profile polyline").length;
+act(third, "pointerdown", 0.5, 0.5); act(third, "pointermove", 0.9, 0.5); act(third, "pointerup", 0.9, 0.5);
+await drawSlots();
+seen.wipe = state.wipe;
+seen.wiped = pixel(third, 0.9);
+const before = brightness(document.getElementById("canvasA"));
+third.dispatchEvent(new WheelEvent("wheel", {deltaY: -1, clientX: third.getBoundingClientRect().left + 5, clientY: third.getBoundingClientRect().top + 5}));
+await drawSlots();
+seen.zoom = state.zoom;
+seen.zoomed = brightness(document.getElementById("canvasA")) !== before;
+document.getElementById("mode").value = "difference";
+await drawSlots();
+seen.difference = document.getElementById("shown").textContent;
+document.getElementById("mode").value = "flicker";
+state.flicker = false; await drawSlots();
+const shownA = brightness(third);
+state.flicker = true; await drawSlots();
+seen.flickers = shownA === brightness(document.getElementById("canvasA")) && shownA !== brightness(third);
+document.querySelector(".point").dispatchEvent(new MouseEvent("mousemove", {bubbles: true}));
+seen.tip = document.querySelector("#tip img").src.slice(0, 22);
+seen.atlas = document.querySelectorAll("#atlasEntries article").length;
+"""
 
 
 def run(*arguments, program=PROGRAM):
@@ -88,8 +86,11 @@ class Chart(unittest.TestCase):
         assert result.returncode == OK, result.stderr
         cls.chart = cls.read()
         cls.report = cls.directory / "report.html"
-        result = run(SOURCES / "bench/chart_report.py", cls.directory / "chart.json", "-o", cls.report,
-                     program=sys.executable)
+        atlas = pathlib.Path(cls.scratch.name) / "atlas"
+        result = run("atlas", "both_sides", "--quick", "--quiet", "-o", atlas)
+        assert result.returncode == OK, result.stderr
+        result = run(SOURCES / "bench/chart_report.py", cls.directory / "chart.json", "--atlas", atlas / "atlas.json", "-o",
+                     cls.report, program=sys.executable)
         assert result.returncode == OK, result.stderr
 
     @classmethod
@@ -111,6 +112,7 @@ class Chart(unittest.TestCase):
                 self.assertGreater(point["shadow_ms_min"], 0)
                 self.assertGreater(point["against_reference"]["max"], 0)
                 self.assertLessEqual(point["against_reference"]["rmse"], point["against_reference"]["max"])
+                self.assertTrue(0 < point["against_reference"]["flip"] < 1)
                 self.assertTrue((self.directory / point["image"]).read_bytes().startswith(b"\x89PNG"))
         self.assertEqual(len({point["id"] for point in self.chart["points"]}), COUNT)
 
@@ -143,6 +145,7 @@ class Chart(unittest.TestCase):
         for point in self.chart["points"]:
             self.assertEqual(float(rows[point["id"]]["shadow_ms"]), point["shadow_ms"])
             self.assertEqual(float(rows[point["id"]]["rmse"]), point["against_reference"]["rmse"])
+            self.assertEqual(float(rows[point["id"]]["flip"]), point["against_reference"]["flip"])
 
     def test_a_second_run_computes_nothing_and_changes_no_point(self):
         written = (self.directory / self.chart["points"][0]["image"]).stat().st_mtime_ns
@@ -237,28 +240,16 @@ class Chart(unittest.TestCase):
         self.assertEqual([p["id"] for p in embedded["chart"]["points"]], [p["id"] for p in self.chart["points"]])
         for point in embedded["chart"]["points"]:
             uri = embedded["pictures"][point["picture"]]
-            content = base64.b64decode(uri.removeprefix("data:image/png;base64,"))
-            self.assertEqual(content, (self.directory / point["image"]).read_bytes())
+            self.assertEqual(browser.png_of(uri), (self.directory / point["image"]).read_bytes())
         download = re.search(r'href="data:application/json;base64,([^"]+)"', page).group(1)
         self.assertEqual(json.loads(base64.b64decode(download)), self.chart)
         download = re.search(r'href="data:text/csv;base64,([^"]+)"', page).group(1)
         self.assertEqual(base64.b64decode(download), (self.directory / "chart.csv").read_bytes())
 
     def test_the_report_works_in_a_browser(self):
-        chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-        if chromium is None:
+        if browser.program() is None:
             self.skipTest("no chromium on PATH")
-        page = self.report.with_name("acted.html")
-        page.write_text(self.report.read_text(encoding="utf-8").replace("</body>", ACTIONS + "</body>"),
-                        encoding="utf-8")
-        with tempfile.TemporaryDirectory(prefix="halfshade-browser-", ignore_cleanup_errors=True) as profile:
-            result = run("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
-                         "--enable-logging=stderr", "--virtual-time-budget=4000", "--dump-dom", page.as_uri(),
-                         program=chromium)
-        self.assertEqual([line for line in result.stderr.splitlines() if "CONSOLE" in line], [])
-        match = re.search(r'data-seen="([^"]*)"', result.stdout)
-        self.assertIsNotNone(match, "the page's script did not finish")
-        seen = json.loads(match.group(1).replace("&quot;", '"'))
+        seen = browser.look(self.report, ACTIONS)
         self.assertEqual(seen["errors"], [])
         self.assertEqual(seen["points"], COUNT)
         self.assertGreater(seen["canvas"], 0)
@@ -270,6 +261,7 @@ class Chart(unittest.TestCase):
         self.assertEqual(seen["difference"], "A - B")
         self.assertTrue(seen["flickers"])
         self.assertEqual(seen["tip"], "data:image/png;base64,")
+        self.assertEqual(seen["atlas"], 1)
 
 
 if __name__ == "__main__":

@@ -232,9 +232,13 @@ class Comparing(CommandLine):
         self.expect(OK, *small("-o", a))
         self.expect(OK, *small("-o", b, samples=1))
         self.expect(OK, "compare", a, a)
-        difference = self.directory / "difference.png"
-        self.expect(DIFFERENT, "compare", a, b, "--difference", difference)
+        self.assertIn("FLIP         mean 0.00000", run("compare", a, a).stdout)
+        difference, flip_map = self.directory / "difference.png", self.directory / "flip.png"
+        self.expect(DIFFERENT, "compare", a, b, "--difference", difference, "--flip-map", flip_map)
         self.assertTrue(difference.exists())
+        self.assertTrue(flip_map.read_bytes().startswith(b"\x89PNG"))
+        flip = float(re.search(r"FLIP +mean ([0-9.]+)", run("compare", a, b).stdout).group(1))
+        self.assertTrue(0 < flip < 0.5, flip)
         self.expect(OK, "compare", a, b, "--max-error", 1)
 
     def test_compare_refuses_what_cannot_be_compared(self):
