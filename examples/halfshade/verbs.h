@@ -16,6 +16,7 @@ void add_chart(CLI::App& app, const std::string& command_line);
 void add_info(CLI::App& app);
 void add_compare(CLI::App& app, int& exit_code);
 void add_verify(CLI::App& app, int& exit_code);
+void add_merge(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_relight(CLI::App& app, const std::string& command_line);
 
 }  // namespace halfshade
