@@ -7,10 +7,10 @@
 #include <cmath>
 #include <fstream>
 
-#include "accumulation_state.h"
 #include "chart_file.h"
 #include "chart_subject.h"
 #include "halfshade/error.h"
+#include "input_hashes.h"
 #include "progress.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/image.h"
