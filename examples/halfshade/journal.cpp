@@ -131,7 +131,8 @@ fs::path Journal::band(const PartRange& rows) const {
 void Journal::remove() const {
   std::error_code error;
   // Manifests first: killed here, nothing may look finished that is not.
-  for (const fs::directory_entry& entry : fs::directory_iterator(directory_)) fs::remove(entry.path() / "part.json", error);
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory_))
+    fs::remove(entry.path() / "part.json", error);
   fs::remove_all(directory_, error);
   if (error) throw Error(ErrorCode::kOutput, fmt::format("{}: {}", directory_.string(), error.message()));
 }
