@@ -7,13 +7,12 @@
 #include <cstdio>
 
 #include "accumulation_state.h"
+#include "frame_series.h"
 #include "halfshade/error.h"
-#include "picture.h"
-#include "pipeline.h"
+#include "input_hashes.h"
 #include "progress.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
-#include "rasterizer/shading.h"
 #include "shadows/solver.h"
 #include "stats_json.h"
 
@@ -22,7 +21,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::uint32_t kMostFrames = 65536;
 constexpr std::uint32_t kReferenceFrame = 1u << 24;  // the reference's sets: far from those of any frame
 constexpr std::uint32_t kReferenceSetSize = 256;
 constexpr std::uint32_t kMostReferenceSamples = 1u << 22;
@@ -79,60 +77,6 @@ struct Accumulation : Pipeline {
   std::size_t frames_fitted = 0;
 };
 
-/// Runs frames through rasterizer and shadows.
-class FrameSource {
- public:
-  explicit FrameSource(Accumulation& run) : pipeline_(run), options_(run.options) {}
-
-  /// The camera of frame `frame`.
-  void draw_frame(std::uint32_t frame) {
-    if (!options_.jitter_camera) return;
-    pipeline_.raster.subpixel_offset = subpixel_jitter(frame);
-    draw(options_, pipeline_);
-  }
-
-  /// Adds a frame of one light to `sum`; receivers() and visibility() then tell about this frame alone.
-  void add(const Light& light, const ShadowConfig& config, VisibilityAccumulator& sum) {
-    const LightSamples samples = make_light_samples(light, config, pipeline_.mesh.frame);
-    receivers_ = make_receivers(pipeline_.gbuffer, samples, config.seed);
-    solve_masks(pipeline_.mesh, receivers_, light, samples, config, masks_, stats_);
-    sum.add(receivers_.sample, masks_);
-    sum.add_hidden(facing_away(), samples.count);
-  }
-
-  /// G-buffer entries, increasing.
-  const std::vector<std::uint32_t>& receivers() const { return receivers_.sample; }
-  std::vector<float> visibility() const {
-    std::vector<float> values(pipeline_.gbuffer.size(), 0.0f);
-    for (std::size_t i = 0; i < receivers_.size(); ++i) values[receivers_.sample[i]] = masks_.visibility(i);
-    return values;
-  }
-
- private:
-  /// Entries that show a surface and are no receivers.
-  std::vector<std::uint32_t> facing_away() const {
-    std::vector<std::uint32_t> entries;
-    std::size_t next = 0;
-    for (std::uint32_t i = 0; i < pipeline_.gbuffer.size(); ++i) {
-      const bool receiver = next < receivers_.size() && receivers_.sample[next] == i;
-      next += receiver;
-      if (!receiver && pipeline_.gbuffer.triangle[i] != kNone) entries.push_back(i);
-    }
-    return entries;
-  }
-
-  Pipeline& pipeline_;
-  const AccumulateOptions& options_;
-  ReceiverArray receivers_;
-  VisibilityMasks masks_;
-  ShadowStats stats_;
-};
-
-std::vector<VisibilityAccumulator> empty_counts(const Pipeline& pipeline) {
-  return std::vector<VisibilityAccumulator>(pipeline.source.view.lights.size(),
-                                            VisibilityAccumulator(pipeline.gbuffer.size()));
-}
-
 VisibilityError error_between(const std::vector<VisibilityAccumulator>& a, const std::vector<VisibilityAccumulator>& b,
                               const std::vector<std::vector<std::uint32_t>>& receivers) {
   VisibilityError error;
@@ -155,7 +99,7 @@ void make_reference(Accumulation& run) {
   const std::vector<Light>& lights = run.source.view.lights;
   Stopwatch watch;
   Progress progress("reference", run.options.quiet);
-  FrameSource source(run);
+  FrameSource source(run, run.options, run.options.jitter_camera);
   ShadowConfig config = shadow_config(run.options);
   config.light_sample_count = per_set;
   config.sample_sets = 1;
@@ -181,97 +125,22 @@ void make_reference(Accumulation& run) {
   reference.ms = watch.lap();
 }
 
-/// What lights and sampling options come to: the samples themselves, of two frames.
-std::string samples_hash(const Accumulation& run, const Light& light) {
-  std::string bytes;
-  for (const std::uint32_t frame : {0u, 1u}) {
-    ShadowConfig config = shadow_config(run.options);
-    config.frame = frame;
-    const LightSamples samples = make_light_samples(light, config, run.mesh.frame);
-    bytes.append(reinterpret_cast<const char*>(samples.points.data()), samples.points.size() * sizeof(vec3));
-    bytes += fmt::format("{} {} {}", samples.count, samples.sets, samples.one_sided);
-  }
-  return hash_of(bytes);
-}
-
 /// Everything that decides the accumulated numbers, as text.
 std::string options_text(const Accumulation& run) {
   const AccumulateOptions& o = run.options;
-  const Camera& c = run.source.view.camera;
-  const auto point = [](const dvec3& p) { return fmt::format("({} {} {})", p.x, p.y, p.z); };
   std::string text =
-      fmt::format("scene {} size {} crop '{}' spp {} jitter_camera {} shading {} reference {} camera {} {} {} {} ",
-                  scene_hash(run.source.scene), o.size, o.crop, o.spp, o.jitter_camera, o.shading, o.reference_samples,
-                  point(c.eye), point(c.target), point(c.up), c.fov_y_deg);
-  text += method_json(o).dump();
-  for (const Light& l : run.source.view.lights) {
-    text += fmt::format(" light {} {} {}", l.name, point(dvec3(l.emission)), samples_hash(run, l));
-  }
+      fmt::format("scene {} view {} size {} crop '{}' spp {} jitter_camera {} shading {} reference {} {}",
+                  scene_hash(run.source.scene), view_hash(run.source.view), o.size, o.crop, o.spp, o.jitter_camera,
+                  o.shading, o.reference_samples, method_json(o).dump());
+  for (const Light& light : run.source.view.lights) text += " light " + frame_samples_hash(run, o, light);
   return text;
-}
-
-std::vector<std::vector<float>> mean_visibility(const Accumulation& run) {
-  std::vector<std::vector<float>> result;
-  for (const VisibilityAccumulator& light : run.state.lights) {
-    std::vector<float>& values = result.emplace_back(light.size());
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(light.visibility(i));
-  }
-  return result;
-}
-
-Picture shaded(const Accumulation& run, const std::vector<std::vector<float>>& visibility) {
-  const std::vector<vec3> color = shade(run.gbuffer, run.mesh.frame, run.source.view, visibility, {}, {}, run.cosines);
-  return resolve(run.gbuffer, run.subsamples, run.mesh.frame, run.source.view, color, visibility);
-}
-
-void add_color(Accumulation& run, const std::vector<std::vector<float>>& visibility_of_frame) {
-  const Picture picture = shaded(run, visibility_of_frame);
-  std::vector<float> values;
-  values.reserve(run.state.color.size());
-  for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
-    values.insert(values.end(), {picture.color[3 * i], picture.color[3 * i + 1], picture.color[3 * i + 2]});
-    values.push_back(picture.alpha[i]);
-  }
-  run.state.color.add(values);
-}
-
-/// Mean over frames and subsamples of a pixel, weighted by how often they showed a surface.
-float pixel_visibility(const Accumulation& run, const VisibilityAccumulator& light, std::size_t x, std::size_t y) {
-  std::uint64_t visible = 0, total = 0;
-  for (std::uint32_t j = 0; j < run.subsamples; ++j) {
-    const std::size_t first = (y * run.subsamples + j) * run.gbuffer.window.width() + x * run.subsamples;
-    for (std::size_t entry = first; entry < first + run.subsamples; ++entry) {
-      visible += light.visible()[entry], total += light.total()[entry];
-    }
-  }
-  return total == 0 ? 0.0f : static_cast<float>(static_cast<double>(visible) / static_cast<double>(total));
-}
-
-/// Mean of all frames. With a moving camera, layers other than colour, alpha and visibility are those of the last
-/// frame.
-Picture mean_picture(const Accumulation& run) {
-  Picture picture = shaded(run, mean_visibility(run));
-  if (!run.options.jitter_camera) return picture;
-  for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) picture.color[3 * i + k] = run.state.color.mean(4 * i + k);
-    picture.alpha[i] = run.state.color.mean(4 * i + 3);
-    for (std::size_t l = 0; l < run.state.lights.size(); ++l) {
-      picture.visibility[l][i] = pixel_visibility(run, run.state.lights[l], i % picture.width, i / picture.width);
-    }
-  }
-  return picture;
 }
 
 /// The picture first: a state on the disk says that its frame's picture is there, too.
 void write_frame(const Accumulation& run) {
   const std::size_t frame = run.state.frames.size() - 1;
-  const ImageAttributes attributes = {{"halfshade.version", HALFSHADE_VERSION},
-                                      {"halfshade.method", run.options.method},
-                                      {"halfshade.light_samples", std::to_string(run.options.light_samples)},
-                                      {"halfshade.seed", std::to_string(run.options.seed)},
-                                      {"halfshade.frames", std::to_string(frame + 1)},
-                                      {"halfshade.scene_hash", scene_hash(run.source.scene)}};
-  write_picture(run.pattern.name(frame), mean_picture(run), attributes);
+  write_picture(run.pattern.name(frame), mean_picture(run, run.state.lights, run.state.color),
+                frame_attributes(run, run.options, frame + 1));
   write_state(run.state_file, run.state);
 }
 
@@ -280,7 +149,7 @@ std::FILE* text_output(const Accumulation& run) { return run.options.json == "-"
 void run_frame(Accumulation& run) {
   const std::vector<Light>& lights = run.source.view.lights;
   Stopwatch watch;
-  FrameSource source(run);
+  FrameSource source(run, run.options, run.options.jitter_camera);
   ShadowConfig config = shadow_config(run.options);
   config.frame = static_cast<std::uint32_t>(run.state.frames.size());
   config.progress = [](double) { return stop_signal() == 0; };
@@ -295,7 +164,7 @@ void run_frame(Accumulation& run) {
     if (!has_reference) receivers.push_back(source.receivers());
     if (run.state.color.size() > 0) visibility.push_back(source.visibility());
   }
-  if (run.state.color.size() > 0) add_color(run, visibility);
+  if (run.state.color.size() > 0) add_color(run, visibility, run.state.color);
   FrameRecord& record = run.state.frames.emplace_back();
   record.ms = watch.lap();
   record.error = has_reference ? error_between(run.state.lights, run.reference.lights, run.reference.receivers)
@@ -387,10 +256,9 @@ void check_options(const AccumulateOptions& o) {
 
 void prepare_state(Accumulation& run) {
   const AccumulateOptions& o = run.options;
-  const std::size_t pixels = run.gbuffer.size() / run.subsamples / run.subsamples;
   run.state.options_hash = hash_of(options_text(run));
   run.state.lights = empty_counts(run);
-  run.state.color = ColorAccumulator(o.jitter_camera && !o.output.empty() ? 4 * pixels : 0);
+  if (o.jitter_camera && !o.output.empty()) run.state.color = empty_colors(run);
   run.state_file = o.output + ".state";
   if (!o.resume || !std::filesystem::exists(run.state_file)) return;
   read_state(run.state_file, run.state);
@@ -403,13 +271,7 @@ void accumulate(const AccumulateOptions& options) {
   check_options(options);
   if (!options.output.empty()) run.pattern = parse_pattern(options.output);
   open_pipeline(options, 40.0, run);
-  if (!run.panes.empty()) {
-    fmt::print(
-        stderr,
-        "halfshade: warning: {} translucent triangles: accumulate averages visibility, which knows the opaque ones "
-        "alone; their light is neither dimmed nor coloured\n",
-        run.panes.translucent);
-  }
+  warn_of_panes(run);
   prepare_state(run);
   if (options.reference_samples > 0) make_reference(run);
   while (!finished(run)) run_frame(run);

@@ -1,8 +1,5 @@
 #include "accumulation_state.h"
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <fmt/format.h>
 
 #include <bit>
@@ -11,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "halfshade/error.h"
+#include "input_hashes.h"
 #include "rasterizer/io/atomic_file.h"
 
 namespace halfshade {
@@ -101,11 +99,6 @@ std::size_t checked_frames(const std::filesystem::path& path, const std::string&
 }
 
 }  // namespace
-
-std::string hash_of(std::string_view bytes) {
-  const XXH128_hash_t digest = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("{:016x}{:016x}", digest.high64, digest.low64);
-}
 
 void write_state(const std::filesystem::path& path, const AccumulationState& state) {
   const std::string payload = payload_of(state);

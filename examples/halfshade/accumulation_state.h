@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <string>
-#include <string_view>
 
 #include "halfshade/accumulation.h"
 
@@ -29,8 +28,5 @@ void write_state(const std::filesystem::path& path, const AccumulationState& sta
 /// Replaces `state`, which tells the expected hash and sizes. Throws Error{kBadInput} with the path for a state of
 /// other options and for damaged files.
 void read_state(const std::filesystem::path& path, AccumulationState& state);
-
-/// XXH3-128 as 32 hexadecimal digits.
-std::string hash_of(std::string_view bytes);
 
 }  // namespace halfshade

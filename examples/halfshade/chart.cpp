@@ -7,10 +7,10 @@
 #include <cmath>
 #include <fstream>
 
-#include "accumulation_state.h"
 #include "chart_file.h"
 #include "chart_subject.h"
 #include "halfshade/error.h"
+#include "input_hashes.h"
 #include "options_json.h"
 #include "output_files.h"
 #include "progress.h"

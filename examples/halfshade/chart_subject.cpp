@@ -3,8 +3,8 @@
 #include <bit>
 #include <cmath>
 
-#include "accumulation_state.h"
 #include "halfshade/error.h"
+#include "input_hashes.h"
 #include "progress.h"
 #include "rasterizer/core/hash.h"
 #include "rasterizer/core/parallel.h"

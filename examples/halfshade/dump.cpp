@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "halfshade/error.h"
+#include "mask_file.h"
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/io/npy.h"
 #include "shadows/opaque_mesh.h"
@@ -25,18 +26,6 @@ template <class T>
 void write_array(const fs::path& directory, const char* name, const char* dtype, std::vector<std::size_t> shape,
                  const std::vector<T>& values) {
   write_npy(directory / name, dtype, shape, values.data());
-}
-
-/// Masks as bytes: bit i % 8 of byte i / 8 is sample i. Words are little-endian, so this only drops the padding.
-std::vector<std::uint8_t> mask_bytes(const VisibilityMasks& masks) {
-  const std::size_t bytes = (masks.sample_count + 7) / 8;
-  std::vector<std::uint8_t> result(masks.receiver_count * bytes);
-  for (std::size_t r = 0; r < masks.receiver_count; ++r) {
-    for (std::size_t b = 0; b < bytes; ++b) {
-      result[r * bytes + b] = static_cast<std::uint8_t>(masks.mask(r)[b / 8] >> (b % 8 * 8));
-    }
-  }
-  return result;
 }
 
 void write_triangles(const fs::path& directory, const LatticeMesh& mesh) {
@@ -155,16 +144,6 @@ void read_alpha(const fs::path& directory, Dump& dump) {
   }
 }
 
-void read_masks(const fs::path& directory, std::uint32_t samples, Dump& dump) {
-  const std::size_t bytes = (samples + 7) / 8, receivers = dump.receivers.size();
-  const auto values = read_values<std::uint8_t>(directory, "masks.npy", {receivers, bytes});
-  dump.masks.reset(receivers, samples);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::size_t r = i / bytes, b = i % bytes;
-    dump.masks.words[r * dump.masks.words_per_receiver + b / 8] |= std::uint64_t{values[i]} << (b % 8 * 8);
-  }
-}
-
 }  // namespace
 
 void write_dump(const fs::path& directory, const LatticeMesh& scene_mesh, const ReceiverArray& receivers,
@@ -183,7 +162,7 @@ void write_dump(const fs::path& directory, const LatticeMesh& scene_mesh, const 
   write_array(directory, "receiver_triangles.npy", "u4", {count}, receivers.triangle);
   write_array(directory, "receiver_sets.npy", "u1", {count}, receivers.set);
   write_array(directory, "light_samples.npy", "f8", {samples.sets, samples.count, 3}, flatten(samples.points));
-  write_array(directory, "masks.npy", "u1", {count, (masks.sample_count + 7) / 8}, mask_bytes(masks));
+  write_masks(directory / "masks.npy", masks);
   write_triangles(directory, mesh);
   write_alpha(directory, mesh, about);
   write_lighting(directory, samples, lighting, about);
@@ -226,7 +205,7 @@ void read_dump(const fs::path& directory, Dump& dump) {
                   fmt::format("receiver_sets.npy: set {} is not in 0..{}", set, dump.samples.sets - 1));
     }
   }
-  read_masks(directory, dump.samples.count, dump);
+  read_masks(directory / "masks.npy", count, dump.samples.count, dump.masks);
 }
 
 DumpLighting read_lighting(const fs::path& directory, Dump& dump) {

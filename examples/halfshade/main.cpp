@@ -46,6 +46,7 @@ int run(int argc, char** argv) {
   halfshade::add_info(app);
   halfshade::add_compare(app, exit_code);
   halfshade::add_verify(app, exit_code);
+  halfshade::add_merge(app, joined(argc, argv), exit_code);
   halfshade::add_relight(app, joined(argc, argv));
   try {
     app.parse(argc, argv);

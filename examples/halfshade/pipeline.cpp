@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <thread>
@@ -177,6 +178,53 @@ void open_pipeline(const PipelineOptions& options, double extra_bytes_per_sample
   check_memory(options, extra_bytes_per_sample, pipeline);
   make_mesh(pipeline);
   draw(options, pipeline);
+}
+
+namespace {
+
+/// Options that change no bit, or that parts name on their own.
+bool decides(const std::string& option) {
+  constexpr std::string_view kOthers[] = {"scene", "--view", "--threads", "--simd", "--quiet", "--help"};
+  return std::find(std::begin(kOthers), std::end(kOthers), option) == std::end(kOthers);
+}
+
+}  // namespace
+
+std::vector<std::string> deciding_arguments(const CLI::App& verb) {
+  PipelineOptions unused;
+  CLI::App known;
+  add_pipeline_options(known, unused);
+  std::vector<std::string> arguments;
+  for (const CLI::Option* option : known.get_options()) {
+    const std::string name = option->get_name();
+    const CLI::Option* given = verb.get_option_no_throw(name);
+    if (!decides(name) || given == nullptr) continue;
+    if (given->get_expected_max() == 0 && given->count() > 0) {
+      arguments.push_back(name);
+      continue;
+    }
+    for (const std::string& value : given->results()) arguments.insert(arguments.end(), {name, value});
+  }
+  return arguments;
+}
+
+void restore_arguments(const std::vector<std::string>& arguments, PipelineOptions& options) {
+  CLI::App parser;
+  add_pipeline_options(parser, options);
+  const PipelineOptions given = options;
+  try {
+    parser.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  } catch (const CLI::ParseError& e) {
+    throw Error(ErrorCode::kBadInput, fmt::format("arguments '{}': {}", fmt::join(arguments, " "), e.what()));
+  }
+  options.scene = given.scene, options.view_file = given.view_file;
+}
+
+std::string picture_command(const PipelineOptions& options) {
+  std::string command = "halfshade render " + options.scene;
+  if (!options.view_file.empty()) command += " --view " + options.view_file;
+  for (const std::string& argument : options.arguments) command += " " + argument;
+  return command;
 }
 
 void add_pipeline_options(CLI::App& verb, PipelineOptions& options) {

@@ -23,6 +23,7 @@ struct PipelineOptions {
   std::vector<std::string> settings;  // "method.option=value"
   ObjLoadOptions load;
   std::string command_line;
+  std::vector<std::string> arguments;  // deciding_arguments
 };
 
 /// Not to be copied or moved once opened: the mesh refers to the scene.
@@ -40,6 +41,16 @@ struct Pipeline {
 };
 
 void add_pipeline_options(CLI::App& verb, PipelineOptions& options);
+
+/// Options that were given to a parsed verb and decide its pictures, "--name value ...", without scene and view; those
+/// of add_pipeline_options, in their order.
+std::vector<std::string> deciding_arguments(const CLI::App& verb);
+
+/// Puts them back into options. Throws Error{kBadInput} for what add_pipeline_options does not know.
+void restore_arguments(const std::vector<std::string>& arguments, PipelineOptions& options);
+
+/// The command that renders the same picture, without names of outputs: equal for every way to the same picture.
+std::string picture_command(const PipelineOptions& options);
 
 /// Checks the options, loads the scene, makes the mesh and the G-buffer; prints warnings to standard error.
 /// `extra_bytes_per_sample` counts what the verb keeps per sample of the picture and light. Throws Error.

@@ -7,7 +7,8 @@
 
 namespace halfshade {
 
-/// SIGINT and SIGTERM set a flag that the progress callback reads; a second one ends the program at once.
+/// SIGINT and SIGTERM set a flag that the progress callback reads. Work that does not look at it in time is not waited
+/// for: the program ends after 100 ms, or at once with a second signal; no temporary file stays either way.
 void install_signal_handlers();
 /// The signal received, or 0.
 int stop_signal();

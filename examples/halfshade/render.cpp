@@ -5,15 +5,14 @@
 
 #include "dump.h"
 #include "halfshade/emission.h"
-#include "picture.h"
-#include "pipeline.h"
+#include "journal.h"
 #include "progress.h"
 #include "rasterizer/core/hash.h"
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/shading.h"
-#include "render_stream.h"
+#include "render_part.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
@@ -25,39 +24,6 @@ namespace halfshade {
 namespace {
 
 using nlohmann::ordered_json;
-
-struct RenderOptions : PipelineOptions {
-  std::string output, json, dump;
-  double verify_percent = 0.0;
-  std::uint32_t probes = 64;
-  bool stats = false, stream = false;
-  StreamRenderOptions streamed;  // what only --stream knows
-};
-
-/// Results of one light.
-struct LightResult {
-  ReceiverArray receivers;
-  LightSamples samples;
-  VisibilityMasks masks;                   // empty for methods without masks
-  std::vector<float> receiver_visibility;  // [receiver]
-  ShadowStats stats;
-  double samples_ms = 0.0, shadow_ms = 0.0, probe_ms = 0.0;
-  ThinFeatures thin;                   // finer than the samples, as the probes see them
-  std::vector<float> visibility;       // [G-buffer entry]
-  std::vector<vec3> visible_emission;  // [G-buffer entry], with an emission image or translucent triangles
-  std::vector<vec3> reaching;          // [receiver] through translucent triangles, if there are any
-  std::uint64_t lit = 0, umbra = 0, penumbra = 0;
-  std::uint64_t verified = 0, verified_bits = 0, wrong_bits = 0;
-  double rms_error = 0.0, largest_error = 0.0;  // of visibility, over the verified receivers
-  double mean_error = 0.0;                      // with its sign: positive is too light
-  std::uint64_t wrong_lights = 0;               // verified receivers whose transmitted light has a wrong bit
-};
-
-struct Render : Pipeline {
-  RenderOptions options;
-  std::vector<LightResult> lights;
-  double resolve_ms = 0.0, write_ms = 0.0;
-};
 
 /// Visibility per G-buffer entry; entries that are no receivers face away from the light: 0.
 void spread_visibility(const GBuffer& gbuffer, LightResult& result) {
@@ -152,26 +118,44 @@ void look_for_thin_features(const Render& render, const Light& light, ShadowConf
              100.0 * result.thin.share_of_light);
 }
 
-void solve_light(Render& render, const Light& light) {
-  const RenderOptions& options = render.options;
-  ShadowConfig config = shadow_config(options);
+}  // namespace
+
+LightResult& add_light(Render& render, const Light& light) {
+  const ShadowConfig config = shadow_config(render.options);
   LightResult& result = render.lights.emplace_back();
   Stopwatch watch;
   result.samples = make_light_samples(light, config, render.mesh.frame);
   result.receivers = make_receivers(render.gbuffer, result.samples, config.seed);
   result.samples_ms = watch.lap();
+  return result;
+}
+
+void finish_light(Render& render, const Light& light, LightResult& result) {
+  ShadowConfig config = shadow_config(render.options);
+  config.progress = [](double) { return stop_signal() == 0; };
+  Stopwatch watch;
+  spread_transmitted(render, light, config, result);
+  result.shadow_ms += watch.lap();
+  spread_visibility(render.gbuffer, result);
+  if (render.panes.empty()) spread_emission(render.gbuffer, light.emission_image, result);
+  if (render.options.verify_percent > 0.0) verify(render, light, result);
+}
+
+namespace {
+
+void solve_light(Render& render, const Light& light) {
+  ShadowConfig config = shadow_config(render.options);
+  LightResult& result = add_light(render, light);
+  Stopwatch watch;
   {
-    Progress progress("shadows of " + light.name, options.quiet);
+    Progress progress("shadows of " + light.name, render.options.quiet);
     config.progress = [&progress](double done) { return progress(done); };
     solve_light_by_method(render.mesh, result.receivers, light, result.samples, config, result.masks,
                           result.receiver_visibility, result.stats);
-    spread_transmitted(render, light, config, result);
   }
   result.shadow_ms = watch.lap();
   look_for_thin_features(render, light, config, result);
-  spread_visibility(render.gbuffer, result);
-  if (render.panes.empty()) spread_emission(render.gbuffer, light.emission_image, result);
-  if (options.verify_percent > 0.0) verify(render, light, result);
+  finish_light(render, light, result);
 }
 
 ImageAttributes attributes(const Render& render) {
@@ -181,7 +165,7 @@ ImageAttributes attributes(const Render& render) {
     if (!light.masks.words.empty()) hashes += (hashes.empty() ? "" : ",") + light.masks.hash();
   }
   return {{"halfshade.version", HALFSHADE_VERSION},
-          {"halfshade.command", o.command_line},
+          {"halfshade.command", picture_command(o)},
           {"halfshade.method", o.method},
           {"halfshade.light_samples", std::to_string(o.light_samples)},
           {"halfshade.seed", std::to_string(o.seed)},
@@ -306,7 +290,7 @@ void write_dumps(const Render& render) {
     std::filesystem::path directory = render.options.dump;
     if (render.lights.size() > 1) directory /= render.source.view.lights[i].name;
     ordered_json about = {{"schema", "halfshade.dump/1"},
-                          {"command", render.options.command_line},
+                          {"command", picture_command(render.options)},
                           {"light", render.source.view.lights[i].name},
                           {"width", render.raster.width / render.subsamples},
                           {"height", render.raster.height / render.subsamples},
@@ -367,23 +351,18 @@ void print_summary(const Render& render) {
   if (!render.options.output.empty()) fmt::print(out, "written    {}\n", render.options.output);
 }
 
-int run(RenderOptions options) {
-  Render render;
-  render.options = std::move(options);
-  const RenderOptions& o = render.options;
+}  // namespace
+
+void check_render_options(const RenderOptions& o) {
   if (!o.output.empty()) check_picture_path(o.output);
   if (!(o.verify_percent >= 0.0 && o.verify_percent <= 100.0))
     usage_error(fmt::format("--verify {} is not in 0..100", o.verify_percent));
   if (!o.dump.empty() && !yields_masks(shadow_config(o)))
     usage_error(fmt::format("--dump: method '{}' yields no masks", o.method));
-  open_pipeline(o, 0.0, render);
-  if (!render.panes.empty() && !yields_masks(shadow_config(o))) {
-    fmt::print(stderr,
-               "halfshade: warning: {} translucent triangles: {} does not know which light samples it sees; its "
-               "visibility times the transmittance of the whole light is approximate\n",
-               render.panes.translucent, o.method);
-  }
-  for (const Light& light : render.source.view.lights) solve_light(render, light);
+}
+
+int finish_render(Render& render) {
+  const RenderOptions& o = render.options;
   if (!o.output.empty()) write_picture_file(render);
   if (!o.dump.empty()) write_dumps(render);
   print_summary(render);
@@ -396,6 +375,30 @@ int run(RenderOptions options) {
     if (must_be_exact && light.wrong_bits + light.wrong_lights > 0) return kDifferent;
   }
   return kOk;
+}
+
+namespace {
+
+int run(const RenderOptions& options) {
+  Render render;
+  render.options = options;
+  check_render_options(options);
+  open_pipeline(options, 0.0, render);
+  if (!render.panes.empty() && !yields_masks(shadow_config(options))) {
+    fmt::print(stderr,
+               "halfshade: warning: {} translucent triangles: {} does not know which light samples it sees; its "
+               "visibility times the transmittance of the whole light is approximate\n",
+               render.panes.translucent, options.method);
+  }
+  if (options.resume) {
+    const Journal journal(options.output + ".journal");
+    solve_in_bands(render, journal);
+    const int code = finish_render(render);
+    journal.remove();
+    return code;
+  }
+  for (const Light& light : render.source.view.lights) solve_light(render, light);
+  return finish_render(render);
 }
 
 /// The default method means hpc here.
@@ -425,14 +428,27 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code) 
       ->check(CLI::Range(0, 65536))
       ->capture_default_str();
   verb->add_flag("--stats", o->stats, "Print every counter of the method");
+  verb->add_flag("--resume", o->resume,
+                 "Keep finished bands in OUTPUT.journal and go on from those of a run that was stopped");
+  verb->add_option("--band-seconds", o->band_seconds, "--resume: work between two savings, 0.01..3600")
+      ->capture_default_str();
+  verb->add_option("--part", o->part, "Do only part i of n, i/n, and write it to the directory --output; see 'merge'");
+  verb->add_option("--split", o->split, "--part: what is divided: crop, frames, samples or blockers")
+      ->capture_default_str();
+  verb->add_option("--frames", o->frames, "--split frames: number of frames in all, as of 'accumulate'")
+      ->capture_default_str();
+  verb->add_flag("--jitter-camera", o->jitter_camera, "--split frames: as of 'accumulate'");
   verb->add_flag("--stream", o->stream, "Never hold the whole scene: method hpc, blockers sorted into files on disk");
   verb->add_option("--stream-dir", o->streamed.directory, "Directory of these files (default: the system's)");
   verb->add_option("--max-memory", o->streamed.max_mib, "--stream: MiB to stay within; receivers are split into parts");
   verb->add_option("--piece", o->streamed.piece, "--stream: triangles of a built-in scene made at once")
       ->capture_default_str();
-  verb->callback([o, &exit_code, command_line] {
+  verb->callback([o, verb, &exit_code, command_line] {
     o->command_line = command_line;
-    run_in_arena(o->threads, [&] { exit_code = o->stream ? run_streamed(*o) : run(*o); });
+    o->arguments = deciding_arguments(*verb);
+    check_partial_options(*o);
+    run_in_arena(o->threads,
+                 [&] { exit_code = o->stream ? run_streamed(*o) : (o->part.empty() ? run(*o) : render_part(*o)); });
   });
 }
 

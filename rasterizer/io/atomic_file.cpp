@@ -3,6 +3,8 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <mutex>
+#include <set>
 #include <utility>
 
 #include <fcntl.h>
@@ -31,6 +33,32 @@ fs::path temporary_name(const fs::path& target) {
   return directory_of(target) / fmt::format(".halfshade-{}-{}.tmp", ::getpid(), counter++);
 }
 
+/// The temporaries that exist. Whoever creates or forgets one holds the lock.
+struct Temporaries {
+  std::mutex lock;
+  std::set<fs::path> paths;
+};
+
+Temporaries& temporaries() {
+  static auto* const all = new Temporaries;  // outlives every thread
+  return *all;
+}
+
+/// The file's descriptor, or -1 with errno.
+int create_temporary(const fs::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (fd >= 0) all.paths.insert(path);
+  return fd;
+}
+
+void forget_temporary(const fs::path& path) {
+  Temporaries& all = temporaries();
+  const std::lock_guard guard(all.lock);
+  all.paths.erase(path);
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(const fs::path& target) : target_(follow_links(target)) {
@@ -40,14 +68,16 @@ AtomicFile::AtomicFile(const fs::path& target) : target_(follow_links(target)) {
   }
   do {
     temporary_ = temporary_name(target_);
-    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    fd_ = create_temporary(temporary_);
   } while (fd_ < 0 && errno == EEXIST);
   if (fd_ < 0) fail("create a file in its directory");
 }
 
 AtomicFile::~AtomicFile() {
   if (fd_ >= 0) ::close(fd_);
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  if (temporary_.empty()) return;
+  ::unlink(temporary_.c_str());
+  forget_temporary(temporary_);
 }
 
 void AtomicFile::write(const void* data, std::size_t bytes) {
@@ -67,7 +97,7 @@ void AtomicFile::commit() {
   const int fd = std::exchange(fd_, -1);
   if (::close(fd) != 0) fail("close");
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("replace");
-  temporary_.clear();
+  forget_temporary(std::exchange(temporary_, fs::path()));
   sync_directory();
 }
 
@@ -90,6 +120,12 @@ void write_file_atomically(const fs::path& path, std::string_view bytes) {
   AtomicFile file(path);
   file.write(bytes.data(), bytes.size());
   file.commit();
+}
+
+void remove_temporaries_for_exit() {
+  Temporaries& all = temporaries();
+  all.lock.lock();  // for good
+  for (const fs::path& path : all.paths) ::unlink(path.c_str());
 }
 
 }  // namespace halfshade

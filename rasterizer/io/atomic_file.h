@@ -34,4 +34,8 @@ class AtomicFile {
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
+/// For a program that ends at once, whatever its threads do: removes the temporary of every AtomicFile that is open and
+/// keeps new ones from being created (their threads wait for ever). Not for signal handlers: it waits for a lock.
+void remove_temporaries_for_exit();
+
 }  // namespace halfshade

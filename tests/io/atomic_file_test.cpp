@@ -7,6 +7,7 @@
 #include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "rasterizer/io/image.h"
@@ -36,6 +37,26 @@ TEST_CASE("without commit the old file stays and the temporary is removed") {
     CHECK(file.temporary().parent_path() == scratch.path());
     CHECK(scratch.file_count() == 2);
   }
+  CHECK(test::read_bytes(scratch.path("a")) == "old");
+  CHECK(scratch.file_count() == 1);
+}
+
+TEST_CASE("a program that ends at once leaves no temporary and the old file") {
+  const Scratch scratch;
+  write_file_atomically(scratch.path("a"), "old");
+  const pid_t child = ::fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    AtomicFile file(scratch.path("a"));
+    file.write("half", 4);
+    const bool both = scratch.file_count() == 2;
+    remove_temporaries_for_exit();
+    ::_exit(both ? 7 : 1);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(child, &status, 0) == child);
+  CHECK(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 7);
   CHECK(test::read_bytes(scratch.path("a")) == "old");
   CHECK(scratch.file_count() == 1);
 }
