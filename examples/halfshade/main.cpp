@@ -43,6 +43,7 @@ int run(int argc, char** argv) {
   halfshade::add_accumulate(app, joined(argc, argv));
   halfshade::add_chart(app, joined(argc, argv));
   halfshade::add_info(app);
+  halfshade::add_recommend(app, joined(argc, argv), exit_code);
   halfshade::add_compare(app, exit_code);
   halfshade::add_verify(app, exit_code);
   halfshade::add_relight(app, joined(argc, argv));

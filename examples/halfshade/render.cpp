@@ -5,6 +5,7 @@
 
 #include "dump.h"
 #include "halfshade/emission.h"
+#include "max_error.h"
 #include "picture.h"
 #include "pipeline.h"
 #include "progress.h"
@@ -14,6 +15,7 @@
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/shading.h"
 #include "render_stream.h"
+#include "shortcuts.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
@@ -26,9 +28,10 @@ namespace {
 using nlohmann::ordered_json;
 
 struct RenderOptions : PipelineOptions {
-  std::string output, json, dump;
+  std::string output, json, dump, max_error;
+  double error_goal = 0.0;  // what max_error says; 0 = none
   double verify_percent = 0.0;
-  bool stats = false, stream = false;
+  bool stats = false, stream = false, measure_shortcuts = false;
   StreamRenderOptions streamed;  // what only --stream knows
 };
 
@@ -47,6 +50,9 @@ struct LightResult {
   std::uint64_t verified = 0, verified_bits = 0, wrong_bits = 0;
   double rms_error = 0.0, largest_error = 0.0;  // of visibility, over the verified receivers
   double mean_error = 0.0;                      // with its sign: positive is too light
+  AdaptiveVisibility adaptive;                  // with --max-error, which needs no masks
+  MaxErrorCheck check;                          // of it
+  std::vector<Shortcut> shortcuts;              // with --stats or --measure-shortcuts
   std::uint64_t wrong_lights = 0;               // verified receivers whose transmitted light has a wrong bit
 };
 
@@ -132,8 +138,34 @@ void verify(const Render& render, const Light& light, LightResult& result) {
   result.rms_error = std::sqrt(result.rms_error);
 }
 
+/// --max-error: visibility of the whole light instead of that of a number of samples.
+void solve_light_to_error(Render& render, const Light& light) {
+  const RenderOptions& options = render.options;
+  ShadowConfig config = shadow_config(options);
+  LightResult& result = render.lights.emplace_back();
+  Stopwatch watch;
+  result.receivers = receivers_of_whole_light(render.gbuffer, light, config, render.mesh.frame);
+  result.samples_ms = watch.lap();
+  {
+    Progress progress("shadows of " + light.name, options.quiet);
+    config.progress = [&progress](double done) { return progress(done); };
+    solve_to_error(render.mesh, result.receivers, light, config, options.error_goal, result.adaptive, result.stats);
+    config.progress = nullptr;
+  }
+  result.shadow_ms = watch.lap();
+  result.receiver_visibility = result.adaptive.visibility;
+  spread_visibility(render.gbuffer, result);
+  if (options.verify_percent <= 0.0) return;
+  result.check = check_max_error_run(render.mesh, result.receivers, light, config, result.adaptive,
+                                     options.verify_percent);
+}
+
 void solve_light(Render& render, const Light& light) {
   const RenderOptions& options = render.options;
+  if (options.error_goal > 0.0) {
+    solve_light_to_error(render, light);
+    return;
+  }
   ShadowConfig config = shadow_config(options);
   LightResult& result = render.lights.emplace_back();
   Stopwatch watch;
@@ -207,6 +239,9 @@ ordered_json light_json(const Render& render, std::size_t index) {
   const std::string assumptions = method_assumptions(shadow_config(render.options), render.source.view.lights[index]);
   if (!assumptions.empty()) json["assumes"] = assumptions;
   if (!light.masks.words.empty()) json["mask_hash"] = light.masks.hash();
+  if (render.options.error_goal > 0.0) json["max_error"] = max_error_json(light.adaptive);
+  if (!light.shortcuts.empty()) json["shortcuts"] = shortcuts_json(light.shortcuts);
+  if (light.check.receivers > 0) json["verify"] = max_error_check_json(light.check);
   if (light.verified > 0)
     json["verify"] = {{"receivers", light.verified},
                       {"bits", light.verified_bits},
@@ -335,29 +370,66 @@ void print_summary(const Render& render) {
         fmt::print(out, "           light through translucent triangles wrong at {} receivers\n", l.wrong_lights);
       }
     }
+    if (render.options.error_goal > 0.0) print_max_error(out, l.adaptive);
+    if (l.check.receivers > 0) {
+      fmt::print(out,
+                 "verify     {} receivers against {} samples: {} above the goal, {} of {} proofs wrong; off by {:.5f} "
+                 "(rms), {:.5f} (largest)\n",
+                 l.check.receivers, kConvergedSamples, l.check.violations, l.check.wrong_proofs, l.check.proofs,
+                 l.check.rmse, l.check.largest);
+    }
     if (!l.masks.words.empty()) fmt::print(out, "mask hash  {}\n", l.masks.hash());
+    print_shortcuts(out, l.shortcuts);
     if (render.options.stats) print_stats(out, s);
   }
   if (!render.options.output.empty()) fmt::print(out, "written    {}\n", render.options.output);
+}
+
+/// What --max-error does not go with.
+void check_error_goal(const RenderOptions& o) {
+  const PipelineOptions defaults;
+  if (o.method != defaults.method || o.pattern != defaults.pattern || o.light_samples != defaults.light_samples ||
+      o.sets != defaults.sets || o.interleave || o.rotate) {
+    usage_error("--max-error chooses method, pattern, sets and number of samples itself");
+  }
+  if (!o.dump.empty()) usage_error("--max-error: --dump needs the same samples for all receivers");
+}
+
+void check_error_goal(const Render& render) {
+  if (!render.panes.empty()) usage_error("--max-error: the scene has translucent triangles");
+  for (const Light& light : render.source.view.lights) {
+    if (!light.emission_image.empty()) usage_error("--max-error: light '" + light.name + "' has an emission image");
+  }
 }
 
 int run(RenderOptions options) {
   Render render;
   render.options = std::move(options);
   const RenderOptions& o = render.options;
+  if (!o.max_error.empty()) {
+    render.options.error_goal = parse_max_error(o.max_error);
+    check_error_goal(o);
+  }
   if (!o.output.empty()) check_picture_path(o.output);
   if (!(o.verify_percent >= 0.0 && o.verify_percent <= 100.0))
     usage_error(fmt::format("--verify {} is not in 0..100", o.verify_percent));
   if (!o.dump.empty() && !yields_masks(shadow_config(o)))
     usage_error(fmt::format("--dump: method '{}' yields no masks", o.method));
   open_pipeline(o, 0.0, render);
+  if (o.error_goal > 0.0) check_error_goal(render);
   if (!render.panes.empty() && !yields_masks(shadow_config(o))) {
     fmt::print(stderr,
                "halfshade: warning: {} translucent triangles: {} does not know which light samples it sees; its "
                "visibility times the transmittance of the whole light is approximate\n",
                render.panes.translucent, o.method);
   }
-  for (const Light& light : render.source.view.lights) solve_light(render, light);
+  for (const Light& light : render.source.view.lights) {
+    solve_light(render, light);
+    LightResult& l = render.lights.back();
+    if (!(o.stats || o.measure_shortcuts) || !promises_exactness(shadow_config(o))) continue;
+    l.shortcuts =
+        list_shortcuts(render.mesh, l.receivers, light, shadow_config(o), l.stats, o.measure_shortcuts);
+  }
   if (!o.output.empty()) write_picture_file(render);
   if (!o.dump.empty()) write_dumps(render);
   print_summary(render);
@@ -367,6 +439,7 @@ int run(RenderOptions options) {
   }
   const bool must_be_exact = promises_exactness(shadow_config(o));
   for (const LightResult& light : render.lights) {
+    if (light.check.violations + light.check.wrong_proofs > 0) return kDifferent;
     if (must_be_exact && light.wrong_bits + light.wrong_lights > 0) return kDifferent;
   }
   return kOk;
@@ -375,6 +448,7 @@ int run(RenderOptions options) {
 /// The default method means hpc here.
 int run_streamed(const RenderOptions& o) {
   if (o.verify_percent > 0.0 || !o.dump.empty()) usage_error("--stream: --verify and --dump need the whole scene");
+  if (!o.max_error.empty()) usage_error("--stream: --max-error needs the whole scene");
   StreamRenderOptions streamed = o.streamed;
   static_cast<PipelineOptions&>(streamed) = o;
   streamed.output = o.output, streamed.json = o.json, streamed.stats = o.stats;
@@ -394,7 +468,12 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code) 
   verb->add_option("--dump", o->dump, "Write receivers, samples, triangles and masks into this directory");
   verb->add_option("--verify", o->verify_percent, "Check this percentage of the receivers with the oracle")
       ->capture_default_str();
-  verb->add_flag("--stats", o->stats, "Print every counter of the method");
+  verb->add_option("--max-error", o->max_error,
+                   "Largest error of visibility of the whole light, 1/4096..1/4: 1/256, 0.004 or 0.4%; samples are "
+                   "spent where it takes them");
+  verb->add_flag("--stats", o->stats, "Print every counter of the method, and its shortcuts");
+  verb->add_flag("--measure-shortcuts", o->measure_shortcuts,
+                 "Exact methods: list the shortcuts with what each gains, from runs with and without it");
   verb->add_flag("--stream", o->stream, "Never hold the whole scene: method hpc, blockers sorted into files on disk");
   verb->add_option("--stream-dir", o->streamed.directory, "Directory of these files (default: the system's)");
   verb->add_option("--max-memory", o->streamed.max_mib, "--stream: MiB to stay within; receivers are split into parts");

@@ -14,6 +14,7 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_accumulate(CLI::App& app, const std::string& command_line);
 void add_chart(CLI::App& app, const std::string& command_line);
 void add_info(CLI::App& app);
+void add_recommend(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_compare(CLI::App& app, int& exit_code);
 void add_verify(CLI::App& app, int& exit_code);
 void add_relight(CLI::App& app, const std::string& command_line);
