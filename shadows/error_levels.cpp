@@ -18,22 +18,22 @@ constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32};  // the level of ea
 constexpr std::uint32_t kWindow = 8;    // receivers before and behind, in Morton order, that a receiver is judged with
 constexpr std::uint32_t kDarkGroup = 32;  // receivers that one certificate of darkness is tried for
 /// Goals below this need the large sets from the start; above it, they would be too much for most receivers.
-constexpr double kLargeSetsBelow = 1.0 / 48.0;
+constexpr double kLargeSetsBelow = 1.0 / 64.0;
 
 // The estimate. A sample next to the outline of what is hidden stands for a cell that is hidden in part: its error is
 // that of a number in 0..1 rounded to 0 or 1, with a standard deviation of 0.29. Both factors are chosen by measurement
 // (docs/max_error.md, "How the factors were chosen").
 constexpr double kCellDeviation = 0.29;
 constexpr double kDeviations = 4.0;      // that are allowed for
-constexpr double kFirstSetFactor = 2.0;  // a single set has nothing to be compared with
-constexpr double kDifferenceFactor = 1.0;
-constexpr double kUnseenSamples = 4.0;  // that a feature no sample has met may be worth
+constexpr double kSpreadFactor = 1.5;
+constexpr double kUnseenSamples = 8.0;  // that a feature no sample has met may be worth
 
 /// All receivers, in Morton order.
 struct Progression {
   std::vector<std::uint32_t> order;
   std::vector<std::uint32_t> visible, boundary, sets;  // sums over sets; sets asked
-  std::vector<double> difference;                      // |V now - V one level ago|
+  std::vector<std::uint64_t> squares;                  // sum over sets of visible^2
+  std::vector<double> spread;                          // see spread_at
   std::vector<std::uint8_t> open;
 };
 
@@ -41,16 +41,25 @@ void start(const ReceiverArray& receivers, Progression& p) {
   p.order = morton_order(receivers.position, [](std::uint32_t) { return true; });
   const std::size_t count = p.order.size();
   p.visible.assign(count, 0), p.boundary.assign(count, 0), p.sets.assign(count, 0);
-  p.difference.assign(count, 0.0), p.open.assign(count, 1);
+  p.squares.assign(count, 0), p.spread.assign(count, 0.0), p.open.assign(count, 1);
 }
 
 double visibility_at(const Progression& p, std::size_t place, std::uint32_t set_size) {
   return p.visible[place] / (static_cast<double>(set_size) * p.sets[place]);
 }
 
+/// How far the mean is off to judge by how far the sets lie apart: their standard error, or the difference from the
+/// mean `before` this level if that is larger.
+double spread_at(const Progression& p, std::size_t place, double before, std::uint32_t set_size) {
+  const double sets = p.sets[place], sum = p.visible[place];
+  const double scatter = std::max(0.0, static_cast<double>(p.squares[place]) - sum * sum / sets);
+  return std::max(std::sqrt(scatter * sets / (sets - 1.0)) / (sets * set_size),
+                  std::fabs(visibility_at(p, place, set_size) - before));
+}
+
 /// What the receivers around a place have in common: an outline that passes between their samples shows in some of them.
 struct Surroundings {
-  double boundary = 0.0, difference = 0.0;  // largest per set, largest of those at the same level
+  double boundary = 0.0, spread = 0.0;  // largest per set, largest of those at the same level
   bool constant = true;                     // all see all of the light, or all see nothing of it
 };
 
@@ -62,7 +71,7 @@ Surroundings look_around(const Progression& p, std::size_t place, std::uint32_t 
   for (std::size_t i = first; i <= last; ++i) {
     s.constant = s.constant && p.visible[i] == (dark ? 0 : p.sets[i] * set_size);
     s.boundary = std::max(s.boundary, static_cast<double>(p.boundary[i]) / p.sets[i]);
-    if (p.sets[i] == p.sets[place]) s.difference = std::max(s.difference, p.difference[i]);
+    if (p.sets[i] == p.sets[place]) s.spread = std::max(s.spread, p.spread[i]);
   }
   return s;
 }
@@ -70,11 +79,11 @@ Surroundings look_around(const Progression& p, std::size_t place, std::uint32_t 
 double estimate_error(const Progression& p, std::size_t place, std::uint32_t set_size) {
   const Surroundings s = look_around(p, place, set_size);
   const double samples = static_cast<double>(set_size) * p.sets[place];
+  if (p.sets[place] == 1) return 1.0 / std::sqrt(samples);  // a strip between two rows of the only set
   const double unseen = kUnseenSamples / samples;
   if (s.constant) return unseen;
   const double scatter = kDeviations * kCellDeviation * std::sqrt(std::max(s.boundary, 1.0) * p.sets[place]) / samples;
-  if (p.sets[place] == 1) return std::max(unseen, kFirstSetFactor * scatter);
-  return std::max({unseen, scatter, kDifferenceFactor * s.difference});
+  return std::max({unseen, scatter, kSpreadFactor * s.spread});
 }
 
 /// A round's sets for the open receivers at `places`. Those that a certificate finds lit are closed.
@@ -93,13 +102,14 @@ void ask_sets(LevelEngine& engine, std::span<const std::uint32_t> places, std::u
     engine.solve_set(set, which, answers);
     for (std::size_t k = 0; k < places.size(); ++k) {
       p.visible[places[k]] += answers[k].visible, p.boundary[places[k]] += answers[k].boundary;
+      p.squares[places[k]] += std::uint64_t{answers[k].visible} * answers[k].visible;
       ++p.sets[places[k]];
       lit[k] |= static_cast<std::uint8_t>(answers[k].lit);
     }
     level.samples += places.size() * engine.set_size();
   }
   for (std::size_t k = 0; k < places.size(); ++k) {
-    if (first > 0) p.difference[places[k]] = std::fabs(visibility_at(p, places[k], engine.set_size()) - before[k]);
+    if (first > 0) p.spread[places[k]] = spread_at(p, places[k], before[k], engine.set_size());
     if (lit[k] == 0) continue;
     p.open[places[k]] = 0;
     result.evidence[p.order[places[k]]] = ErrorEvidence::kProof;
@@ -140,7 +150,7 @@ void settle(std::span<const std::uint32_t> places, std::uint32_t set_size, doubl
     if (p.open[places[k]] == 0) continue;
     const std::uint32_t receiver = p.order[places[k]];
     result.bound[receiver] = static_cast<float>(estimates[k]);
-    if (estimates[k] <= max_error) {
+    if (p.sets[places[k]] > 1 && estimates[k] <= max_error) {
       p.open[places[k]] = 0, ++level.settled;
     } else {
       level.largest_bound = std::max(level.largest_bound, estimates[k]);
