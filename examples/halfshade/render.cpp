@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <optional>
 
 #include "dump.h"
 #include "halfshade/emission.h"
@@ -28,7 +29,8 @@ namespace {
 using nlohmann::ordered_json;
 
 struct RenderOptions : PipelineOptions {
-  std::string output, json, dump, max_error;
+  std::string output, json, dump;
+  std::optional<std::string> max_error;
   double error_goal = 0.0;  // what max_error says; 0 = none
   double verify_percent = 0.0;
   bool stats = false, stream = false, measure_shortcuts = false;
@@ -406,8 +408,8 @@ int run(RenderOptions options) {
   Render render;
   render.options = std::move(options);
   const RenderOptions& o = render.options;
-  if (!o.max_error.empty()) {
-    render.options.error_goal = parse_max_error(o.max_error);
+  if (o.max_error) {
+    render.options.error_goal = parse_max_error(*o.max_error);
     check_error_goal(o);
   }
   if (!o.output.empty()) check_picture_path(o.output);
@@ -448,7 +450,7 @@ int run(RenderOptions options) {
 /// The default method means hpc here.
 int run_streamed(const RenderOptions& o) {
   if (o.verify_percent > 0.0 || !o.dump.empty()) usage_error("--stream: --verify and --dump need the whole scene");
-  if (!o.max_error.empty()) usage_error("--stream: --max-error needs the whole scene");
+  if (o.max_error) usage_error("--stream: --max-error needs the whole scene");
   StreamRenderOptions streamed = o.streamed;
   static_cast<PipelineOptions&>(streamed) = o;
   streamed.output = o.output, streamed.json = o.json, streamed.stats = o.stats;
