@@ -14,9 +14,9 @@
 namespace halfshade {
 namespace {
 
-constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32};  // the level of each round
+constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32, 64, 128};  // the level of each round
 constexpr std::uint32_t kWindow = 8;    // receivers before and behind, in Morton order, that a receiver is judged with
-constexpr std::uint32_t kDarkGroup = 32;  // receivers that one certificate of darkness is tried for
+constexpr std::uint32_t kGroup = 32;  // receivers that one certificate is tried for
 /// Goals below this need the large sets from the start; above it, they would be too much for most receivers.
 constexpr double kLargeSetsBelow = 1.0 / 64.0;
 
@@ -26,6 +26,7 @@ constexpr double kLargeSetsBelow = 1.0 / 64.0;
 constexpr double kCellDeviation = 0.29;
 constexpr double kDeviations = 4.0;      // that are allowed for
 constexpr double kSpreadFactor = 1.5;
+constexpr double kTwoSetsFactor = 2.0;  // two sets may be wrong by chance in the same way
 constexpr double kUnseenSamples = 8.0;  // that a feature no sample has met may be worth
 
 /// All receivers, in Morton order.
@@ -83,7 +84,7 @@ double estimate_error(const Progression& p, std::size_t place, std::uint32_t set
   const double unseen = kUnseenSamples / samples;
   if (s.constant) return unseen;
   const double scatter = kDeviations * kCellDeviation * std::sqrt(std::max(s.boundary, 1.0) * p.sets[place]) / samples;
-  return std::max({unseen, scatter, kSpreadFactor * s.spread});
+  return (p.sets[place] == 2 ? kTwoSetsFactor : 1.0) * std::max({unseen, scatter, kSpreadFactor * s.spread});
 }
 
 /// A round's sets for the open receivers at `places`. Those that a certificate finds lit are closed.
@@ -117,23 +118,25 @@ void ask_sets(LevelEngine& engine, std::span<const std::uint32_t> places, std::u
   }
 }
 
-/// Groups of neighbours that see nothing: is there one triangle that hides the whole light from all of them?
-void prove_dark(const LevelEngine& engine, Progression& p, AdaptiveVisibility& result, ErrorLevel& level) {
-  const std::size_t groups = (p.order.size() + kDarkGroup - 1) / kDarkGroup;
-  std::vector<std::uint8_t> dark(groups, 0);
+/// Groups of neighbours that all see everything, or all nothing: can that be proved for the whole light?
+void prove_groups(const LevelEngine& engine, Progression& p, AdaptiveVisibility& result, ErrorLevel& level) {
+  const std::size_t groups = (p.order.size() + kGroup - 1) / kGroup;
+  std::vector<std::uint8_t> proved(groups, 0);
   parallel_ranges(groups, 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t g = begin; g != end; ++g) {
-      const std::size_t first = g * kDarkGroup, count = std::min<std::size_t>(p.order.size() - first, kDarkGroup);
-      const auto seen = p.visible.begin() + static_cast<std::ptrdiff_t>(first);
-      if (std::any_of(seen, seen + static_cast<std::ptrdiff_t>(count), [](std::uint32_t v) { return v != 0; })) continue;
-      dark[g] = engine.all_dark(std::span(p.order).subspan(first, count));
+      const std::size_t first = g * kGroup, count = std::min<std::size_t>(p.order.size() - first, kGroup);
+      const auto seen = std::span(p.visible).subspan(first, count);
+      const auto all = [&](std::uint32_t v) { return std::count(seen.begin(), seen.end(), v) == std::ssize(seen); };
+      const auto which = std::span(p.order).subspan(first, count);
+      if (all(0)) proved[g] = engine.all_dark(which);
+      if (all(engine.set_size())) proved[g] = engine.all_lit(which);
     }
   });
   for (std::size_t place = 0; place < p.order.size(); ++place) {
-    if (dark[place / kDarkGroup] == 0 || p.open[place] == 0) continue;
+    if (proved[place / kGroup] == 0 || p.open[place] == 0) continue;
     p.open[place] = 0;
     result.evidence[p.order[place]] = ErrorEvidence::kProof;
-    ++result.proved_umbra, ++level.proved;
+    ++(p.visible[place] == 0 ? result.proved_umbra : result.proved_lit), ++level.proved;
   }
 }
 
@@ -230,7 +233,7 @@ void solve_to_error(const LatticeMesh& scene_mesh, const ReceiverArray& receiver
     ErrorLevel level;
     level.samples_per_receiver = sets * engine.set_size(), level.receivers = places.size();
     ask_sets(engine, places, asked_sets, sets, config, p, result, level);
-    if (asked_sets == 0) prove_dark(engine, p, result, level);
+    if (asked_sets == 0) prove_groups(engine, p, result, level);
     const bool last = sets == kSetsAfter[std::size(kSetsAfter) - 1];
     settle(places, engine.set_size(), max_error, last, p, result, level);
     level.ms = watch.lap() - (stats.build_ms - build_before);

@@ -96,6 +96,30 @@ bool segment_meets(const dvec3& a, const dvec3& b, const BlockerTree::Node& node
   return from <= to;
 }
 
+/// No segment from the box to the light meets the triangle: it lies on one side of the triangle's plane, or beyond one of
+/// its edges. The determinants are linear in either end of the segment, so corners speak for all points.
+bool hides_nothing(const LatticeMesh& mesh, std::uint32_t triangle, std::span<const vec3> from,
+                   std::span<const vec3> light) {
+  const std::array<vec3, 3> corner = mesh.corners(triangle);
+  const auto side_of = [&](const vec3& p) { return orient3d(corner[0], corner[1], corner[2], p); };
+  int low = 1, high = -1, light_low = 1, light_high = -1;
+  for (const vec3& r : from) low = std::min(low, side_of(r)), high = std::max(high, side_of(r));
+  for (const vec3& l : light) light_low = std::min(light_low, side_of(l)), light_high = std::max(light_high, side_of(l));
+  if ((low >= 0 && light_low >= 0) || (high <= 0 && light_high <= 0)) return true;
+  if (low != high) return false;  // receivers on both sides: no edge is oriented for all of them
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto beyond = [&](const vec3& r, const vec3& l) {
+      return low * orient3d(corner[k], corner[(k + 1) % 3], l, r) < 0;
+    };
+    bool all = true;
+    for (std::size_t i = 0; i < from.size() && all; ++i) {
+      all = std::all_of(light.begin(), light.end(), [&](const vec3& l) { return beyond(from[i], l); });
+    }
+    if (all) return true;
+  }
+  return false;
+}
+
 /// For a fixed light point the receivers that a triangle hides it from are an intersection of half spaces, and so are
 /// the light points hidden from a fixed receiver: corners of both regions speak for all points in them.
 bool hides_all(const LatticeMesh& mesh, std::uint32_t triangle, const Box& box, std::span<const vec3> light) {
@@ -242,6 +266,40 @@ void LevelEngine::solve_generally(const LightSamples& samples, std::span<const s
   parallel_ranges(which.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) answers[i] = read_mask(masks.mask(i), side_, cell_of);
   });
+}
+
+bool LevelEngine::all_lit(std::span<const std::uint32_t> which) const {
+  if (!rows_ || which.empty() || tree_.blockers.empty()) return false;
+  Box box, box_in_frame, light_in_frame;
+  for (const std::uint32_t i : which) {
+    box.add(receivers_.position[i]);
+    box_in_frame.add(vec3(frame_.to_frame(dvec3(receivers_.position[i]))));
+  }
+  for (const vec3& l : corners_) light_in_frame.add(vec3(frame_.to_frame(dvec3(l))));
+  for (Box* b : {&box_in_frame, &light_in_frame}) b->low -= 1e-6f, b->high += 1e-6f;
+  const Shaft shaft(box_in_frame, light_in_frame);
+  std::vector<vec3> from;
+  for (int i = 0; i < 8; ++i) {
+    from.emplace_back(i & 1 ? box.high.x : box.low.x, i & 2 ? box.high.y : box.low.y, i & 4 ? box.high.z : box.low.z);
+  }
+  std::vector<std::uint32_t> stack = {0};
+  while (!stack.empty()) {
+    const BlockerTree::Node& node = tree_.nodes[stack.back()];
+    stack.pop_back();
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const Box child{{node.low[0][i], node.low[1][i], node.low[2][i]}, {node.high[0][i], node.high[1][i], node.high[2][i]}};
+      if (!shaft.may_meet(child)) continue;
+      if ((node.child[i] & BlockerTree::kLeafBit) == 0) {
+        stack.push_back(node.child[i]);
+        continue;
+      }
+      const BlockerTree::Leaf& leaf = tree_.leaves[node.child[i] & ~BlockerTree::kLeafBit];
+      for (std::uint32_t lane = 0; lane < leaf.count; ++lane) {
+        if (!hides_nothing(mesh_, leaf.triangle[lane], from, corners_)) return false;
+      }
+    }
+  }
+  return true;
 }
 
 bool LevelEngine::all_dark(std::span<const std::uint32_t> which) const {

@@ -25,6 +25,8 @@ class LevelEngine {
   /// Set `index` for receivers `which`, which should be in an order that keeps neighbours together; answers in it.
   void solve_set(std::uint32_t index, std::span<const std::uint32_t> which, std::vector<SetAnswer>& answers);
 
+  /// Certificate: no triangle can hide any point of the light from any of `which`. Only after the first set.
+  bool all_lit(std::span<const std::uint32_t> which) const;
   /// Certificate: some single opaque triangle hides the whole light from all of `which`. Only after the first set.
   bool all_dark(std::span<const std::uint32_t> which) const;
 

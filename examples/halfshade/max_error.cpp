@@ -51,20 +51,28 @@ ReceiverArray receivers_of_whole_light(const GBuffer& gbuffer, const Light& ligh
   return make_receivers(gbuffer, make_set(light, config, frame, 32, 0), config.seed);
 }
 
-std::vector<double> converged_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                                         const ShadowConfig& asked, std::span<const std::uint32_t> which) {
-  ShadowConfig config = asked;
-  config.method = ShadowMethod::kExact;
-  config.pattern = SamplePattern::kLowDiscrepancy;
-  config.light_sample_count = kConvergedSamples / kReferenceSets;
-  config.sample_sets = kReferenceSets, config.interleave = false, config.rotate_sets = false;
-  config.frame = kReferenceFrame;
-  const LightSamples samples = make_light_samples(light, config, mesh.frame);
+namespace {
+
+/// Sums over sets of the share that a receiver sees, and of its square.
+struct ReferenceSums {
+  double sum = 0.0, squares = 0.0;
+  std::uint32_t sets = 0;
+  double mean() const { return sum / sets; }
+  double standard_error() const {
+    return std::sqrt(std::max(0.0, squares / sets - mean() * mean()) / std::max(1.0, sets - 1.0));
+  }
+};
+
+/// 16 more sets for each receiver of `which`.
+void add_reference_sets(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                        ShadowConfig config, std::span<const std::uint32_t> which, std::vector<ReferenceSums>& sums) {
   constexpr std::size_t kPerCall = 32768;
-  std::vector<double> result;
   for (std::size_t first = 0; first < which.size(); first += kPerCall) {
+    const auto part_of = which.subspan(first, std::min(kPerCall, which.size() - first));
+    config.frame = kReferenceFrame + sums[part_of[0]].sets;
+    const LightSamples samples = make_light_samples(light, config, mesh.frame);
     ReceiverArray part;
-    for (const std::uint32_t i : which.subspan(first, std::min(kPerCall, which.size() - first))) {
+    for (const std::uint32_t i : part_of) {
       for (std::uint32_t set = 0; set < samples.sets; ++set) {
         part.push_back(receivers.position[i], receivers.normal[i], receivers.triangle[i], receivers.sample[i],
                        static_cast<std::uint8_t>(set));
@@ -73,12 +81,32 @@ std::vector<double> converged_visibility(const LatticeMesh& mesh, const Receiver
     VisibilityMasks masks;
     ShadowStats stats;
     solve_masks(mesh, part, light, samples, config, masks, stats);
-    for (std::size_t i = 0; i < part.size(); i += samples.sets) {
-      std::uint64_t blocked = 0;
-      for (std::uint32_t set = 0; set < samples.sets; ++set) blocked += masks.blocked_count(i + set);
-      result.push_back(1.0 - static_cast<double>(blocked) / (static_cast<double>(samples.count) * samples.sets));
+    for (std::size_t k = 0; k < part.size(); ++k) {
+      ReferenceSums& s = sums[part_of[k / samples.sets]];
+      const double v = masks.visibility(k);
+      s.sum += v, s.squares += v * v, ++s.sets;
     }
   }
+}
+
+}  // namespace
+
+std::vector<double> converged_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                                         const ShadowConfig& asked, double goal,
+                                         std::span<const std::uint32_t> which) {
+  ShadowConfig config = asked;
+  config.method = ShadowMethod::kExact;
+  config.pattern = SamplePattern::kLowDiscrepancy;
+  config.light_sample_count = kConvergedSamples / kReferenceSets;
+  config.sample_sets = kReferenceSets, config.interleave = false, config.rotate_sets = false;
+  std::vector<ReferenceSums> sums(receivers.size());
+  std::vector<std::uint32_t> open(which.begin(), which.end());
+  for (const std::uint32_t sets : {16u, 64u, 256u}) {
+    while (!open.empty() && sums[open[0]].sets < sets) add_reference_sets(mesh, receivers, light, config, open, sums);
+    std::erase_if(open, [&](std::uint32_t i) { return 4.0 * sums[i].standard_error() <= 0.5 * goal; });
+  }
+  std::vector<double> result;
+  for (const std::uint32_t i : which) result.push_back(sums[i].mean());
   return result;
 }
 
@@ -89,7 +117,7 @@ MaxErrorCheck check_max_error_run(const LatticeMesh& mesh, const ReceiverArray& 
   for (std::uint32_t i = 0; i < receivers.size(); ++i) {
     if (hash32(i, 0x5eed) <= share) which.push_back(i);
   }
-  const std::vector<double> truth = converged_visibility(mesh, receivers, light, config, which);
+  const std::vector<double> truth = converged_visibility(mesh, receivers, light, config, result.max_error, which);
   MaxErrorCheck check;
   check.receivers = which.size();
   for (std::size_t k = 0; k < which.size(); ++k) {

@@ -193,7 +193,7 @@ int run(RecommendOptions o) {
     s.receivers = receivers_of_whole_light(pipeline.gbuffer, light, config, pipeline.mesh.frame);
     std::vector<std::uint32_t> all(s.receivers.size());
     for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-    s.truth = converged_visibility(pipeline.mesh, s.receivers, light, config, all);
+    s.truth = converged_visibility(pipeline.mesh, s.receivers, light, config, o.goal, all);
     const std::vector<Candidate> measured = measure(s, o);
     const Candidate* best = cheapest(measured, o.goal);
     found_all = found_all && best != nullptr;
