@@ -97,18 +97,17 @@ void ask_sets(LevelEngine& engine, std::span<const std::uint32_t> places, std::u
   if (first > 0) {
     for (std::size_t k = 0; k < places.size(); ++k) before[k] = visibility_at(p, places[k], engine.set_size());
   }
+  report_progress(config, static_cast<double>(first) / kSetsAfter[std::size(kSetsAfter) - 1]);
   std::vector<SetAnswer> answers;
-  for (std::uint32_t set = first; set < end; ++set) {
-    report_progress(config, static_cast<double>(set) / kSetsAfter[std::size(kSetsAfter) - 1]);
-    engine.solve_set(set, which, answers);
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      p.visible[places[k]] += answers[k].visible, p.boundary[places[k]] += answers[k].boundary;
-      p.squares[places[k]] += std::uint64_t{answers[k].visible} * answers[k].visible;
-      ++p.sets[places[k]];
-      lit[k] |= static_cast<std::uint8_t>(answers[k].lit);
-    }
-    level.samples += places.size() * engine.set_size();
+  engine.solve_sets(first, end, which, answers);
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const std::size_t k = i % places.size(), place = places[k];
+    p.visible[place] += answers[i].visible, p.boundary[place] += answers[i].boundary;
+    p.squares[place] += std::uint64_t{answers[i].visible} * answers[i].visible;
+    ++p.sets[place];
+    lit[k] |= static_cast<std::uint8_t>(answers[i].lit);
   }
+  level.samples += answers.size() * engine.set_size();
   for (std::size_t k = 0; k < places.size(); ++k) {
     if (first > 0) p.spread[places[k]] = spread_at(p, places[k], before[k], engine.set_size());
     if (lit[k] == 0) continue;
@@ -183,7 +182,7 @@ void reset(std::size_t count, double max_error, AdaptiveVisibility& result) {
 void solve_all_samples(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                        const ShadowConfig& config, AdaptiveVisibility& result, ShadowStats& stats) {
   Stopwatch watch;
-  const LightSamples samples = make_set(light, config, mesh.frame, 16, 0);
+  const LightSamples samples = make_sets(light, config, mesh.frame, 16, 0);
   VisibilityMasks masks;
   solve_masks(mesh, receivers, light, samples, config, masks, stats);
   visibility_of(masks, result.visibility);

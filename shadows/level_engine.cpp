@@ -22,13 +22,18 @@ struct RowSetup {
 namespace {
 
 constexpr std::size_t kCluster = 64;   // receivers that share a list of leaves
+constexpr std::uint32_t kSetsAtOnce = 16;
 constexpr double kGrazing = 1e-5;      // as in exact_engine.cpp: nearer to the light's plane the row kernel is not used
 constexpr double kAround = 1.0 + 1e-5;  // corners of the light's region are moved outwards by this factor
 
-ReceiverArray selection(const ReceiverArray& receivers, std::span<const std::uint32_t> which) {
+/// [set][place in which]
+ReceiverArray selection(const ReceiverArray& receivers, std::span<const std::uint32_t> which, std::uint32_t sets) {
   ReceiverArray part;
-  for (const std::uint32_t i : which) {
-    part.push_back(receivers.position[i], receivers.normal[i], receivers.triangle[i], receivers.sample[i], 0);
+  for (std::uint32_t set = 0; set < sets; ++set) {
+    for (const std::uint32_t i : which) {
+      part.push_back(receivers.position[i], receivers.normal[i], receivers.triangle[i], receivers.sample[i],
+                     static_cast<std::uint8_t>(set));
+    }
   }
   return part;
 }
@@ -138,7 +143,7 @@ bool hides_all(const LatticeMesh& mesh, std::uint32_t triangle, const Box& box, 
 LevelEngine::LevelEngine(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                          const ShadowConfig& config, std::uint32_t side, ShadowStats& stats)
     : mesh_(mesh), receivers_(receivers), light_(light), config_(config), side_(side), stats_(stats) {
-  const LightSamples first = make_set(light, config, mesh.frame, side, 0);
+  const LightSamples first = make_sets(light, config, mesh.frame, side, 0);
   rows_ = has_row_sets(light) && first.flat && !mesh.triangles.empty();
   if (!rows_) return;
   corners_ = region_corners(light, first, mesh.frame);
@@ -152,16 +157,19 @@ LevelEngine::LevelEngine(const LatticeMesh& mesh, const ReceiverArray& receivers
   stats.build_ms += watch.lap();
 }
 
-void LevelEngine::solve_set(std::uint32_t index, std::span<const std::uint32_t> which,
-                            std::vector<SetAnswer>& answers) {
-  answers.assign(which.size(), {});
-  const LightSamples samples = make_set(light_, config_, mesh_.frame, side_, index);
+void LevelEngine::solve_sets(std::uint32_t first, std::uint32_t end, std::span<const std::uint32_t> which,
+                             std::vector<SetAnswer>& answers) {
   if (mesh_.triangles.empty()) {
-    answers.assign(which.size(), {samples.count, 0, true});
-  } else if (rows_) {
-    solve_rows(samples, which, answers);
-  } else {
-    solve_generally(samples, which, answers);
+    answers.assign(which.size() * (end - first), {set_size(), 0, true});
+    return;
+  }
+  answers.assign(which.size() * (end - first), {});
+  for (std::uint32_t set = first; set < end;) {
+    const std::uint32_t count = rows_ && set < kTiltedSets ? 1 : std::min(end - set, kSetsAtOnce);
+    const LightSamples samples = make_sets(light_, config_, mesh_.frame, side_, set, count);
+    const auto part = std::span(answers).subspan(which.size() * (set - first), which.size() * count);
+    rows_ ? solve_rows(samples, which, part) : solve_generally(samples, which, part);
+    set += count;
   }
 }
 
@@ -173,7 +181,7 @@ void LevelEngine::prepare_samples(const LightSamples& samples, RowSetup& setup) 
 }
 
 void LevelEngine::solve_rows(const LightSamples& samples, std::span<const std::uint32_t> which,
-                             std::vector<SetAnswer>& answers) {
+                             std::span<SetAnswer> answers) {
   RowSetup setup;
   prepare_samples(samples, setup);
   const LightFrame front{dvec3(setup.kernel.center), samples.axis_u, samples.axis_v, samples.axis_n};
@@ -191,7 +199,7 @@ void LevelEngine::solve_rows(const LightSamples& samples, std::span<const std::u
     if (places[side].empty()) continue;
     std::vector<std::uint32_t> part;
     for (const std::uint32_t k : places[side]) part.push_back(which[k]);
-    std::vector<SetAnswer> found(part.size());
+    std::vector<SetAnswer> found(part.size() * samples.sets);
     if (side == 2) {
       solve_generally(samples, part, found);
     } else if (side == 1 && samples.one_sided) {
@@ -199,12 +207,14 @@ void LevelEngine::solve_rows(const LightSamples& samples, std::span<const std::u
     } else {
       solve_row_side(setup, side == 0 ? front : LightFrame{front.origin, front.u, front.v, -front.n}, part, found);
     }
-    for (std::size_t i = 0; i < part.size(); ++i) answers[places[side][i]] = found[i];
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      answers[i / part.size() * which.size() + places[side][i % part.size()]] = found[i];
+    }
   }
 }
 
 void LevelEngine::solve_row_side(const RowSetup& setup, const LightFrame& frame, std::span<const std::uint32_t> which,
-                                 std::vector<SetAnswer>& answers) {
+                                 std::span<SetAnswer> answers) {
   Stopwatch watch;
   refit_blocker_tree(mesh_, setup.kernel, frame, tree_);
   frame_ = frame;
@@ -212,20 +222,23 @@ void LevelEngine::solve_row_side(const RowSetup& setup, const LightFrame& frame,
   stats_.cull_ms += watch.lap();
   const ExactScene scene{&tree_, &setup.kernel, &rectangles, &setup.rows, frame};
   constexpr std::size_t kPerTask = kCluster * 16;
-  const std::size_t words = setup.kernel.padded / 64, tasks = (which.size() + kPerTask - 1) / kPerTask;
+  const std::size_t words = setup.kernel.padded / 64, pieces = (which.size() + kPerTask - 1) / kPerTask;
+  const std::size_t tasks = pieces * setup.kernel.sets;  // a task has one set
   std::vector<ShadowStats> counted(tasks);
   parallel_tasks(tasks, [&](std::size_t t) {
-    const std::size_t first = t * kPerTask, count = std::min(which.size() - first, kPerTask);
+    const std::size_t first = t % pieces * kPerTask, count = std::min(which.size() - first, kPerTask);
+    const std::size_t set = t / pieces;
     const std::vector<std::uint32_t> order(which.begin() + static_cast<std::ptrdiff_t>(first),
                                            which.begin() + static_cast<std::ptrdiff_t>(first + count));
     KernelReceivers kernel = gather_receivers(receivers_, order, words);
+    std::fill(kernel.set.begin(), kernel.set.end(), static_cast<std::uint8_t>(set));
     auto scratch = std::make_unique<ExactScratch>();
     for (std::size_t begin = 0; begin < count; begin += kCluster) {
       const std::size_t end = std::min(count, begin + kCluster);
       const std::uint64_t lit_before = scratch->clusters_lit;
       solve_packets(scene, begin, end, kernel, *scratch);
       for (std::size_t i = begin; i < end; ++i) {
-        SetAnswer& answer = answers[first + i] = read_mask({kernel.mask(i), words}, side_, {});
+        SetAnswer& answer = answers[set * which.size() + first + i] = read_mask({kernel.mask(i), words}, side_, {});
         answer.lit = scratch->clusters_lit != lit_before;
       }
     }
@@ -244,8 +257,8 @@ void LevelEngine::solve_row_side(const RowSetup& setup, const LightFrame& frame,
 }
 
 void LevelEngine::solve_generally(const LightSamples& samples, std::span<const std::uint32_t> which,
-                                  std::vector<SetAnswer>& answers) {
-  const ReceiverArray part = selection(receivers_, which);
+                                  std::span<SetAnswer> answers) {
+  const ReceiverArray part = selection(receivers_, which, samples.sets);
   ShadowConfig config = config_;
   config.method = ShadowMethod::kExact;
   VisibilityMasks masks;
@@ -255,16 +268,20 @@ void LevelEngine::solve_generally(const LightSamples& samples, std::span<const s
   stats_.cull_ms += own.cull_ms, stats_.test_ms += own.test_ms;
   stats_.sample_tests += own.sample_tests, stats_.exact_fallbacks += own.exact_fallbacks;
   if (samples.count != set_size()) {  // a point, or a light made of samples: the answer itself
-    for (std::size_t i = 0; i < which.size(); ++i) answers[i].visible = samples.count - masks.blocked_count(i);
+    for (std::size_t i = 0; i < answers.size(); ++i) answers[i].visible = samples.count - masks.blocked_count(i);
     return;
   }
-  std::vector<std::uint32_t> cell_of;
+  std::vector<std::uint32_t> cell_of;  // [set][sample]
   for (const dvec2& st : samples.st) {
     cell_of.push_back(static_cast<std::uint32_t>(st.y * side_) * side_ + static_cast<std::uint32_t>(st.x * side_));
   }
   if (has_row_sets(light_)) cell_of.clear();
-  parallel_ranges(which.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) answers[i] = read_mask(masks.mask(i), side_, cell_of);
+  parallel_ranges(answers.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const std::size_t set = i / which.size();
+      const auto cells = std::span(cell_of).subspan(cell_of.empty() ? 0 : set * samples.count);
+      answers[i] = read_mask(masks.mask(i), side_, cells.first(cell_of.empty() ? 0 : samples.count));
+    }
   });
 }
 

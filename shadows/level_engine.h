@@ -22,8 +22,10 @@ class LevelEngine {
   LevelEngine(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light, const ShadowConfig& config,
               std::uint32_t side, ShadowStats& stats);
 
-  /// Set `index` for receivers `which`, which should be in an order that keeps neighbours together; answers in it.
-  void solve_set(std::uint32_t index, std::span<const std::uint32_t> which, std::vector<SetAnswer>& answers);
+  /// Sets `first` .. `end - 1` for receivers `which`, which should be in an order that keeps neighbours together.
+  /// `answers` get [set][place in which].
+  void solve_sets(std::uint32_t first, std::uint32_t end, std::span<const std::uint32_t> which,
+                  std::vector<SetAnswer>& answers);
 
   /// Certificate: no triangle can hide any point of the light from any of `which`. Only after the first set.
   bool all_lit(std::span<const std::uint32_t> which) const;
@@ -34,11 +36,11 @@ class LevelEngine {
   bool uses_rows() const { return rows_; }
 
  private:
-  void solve_rows(const LightSamples& samples, std::span<const std::uint32_t> which, std::vector<SetAnswer>& answers);
+  void solve_rows(const LightSamples& samples, std::span<const std::uint32_t> which, std::span<SetAnswer> answers);
   void solve_row_side(const struct RowSetup& setup, const LightFrame& frame, std::span<const std::uint32_t> which,
-                      std::vector<SetAnswer>& answers);
+                      std::span<SetAnswer> answers);
   void solve_generally(const LightSamples& samples, std::span<const std::uint32_t> which,
-                       std::vector<SetAnswer>& answers);
+                       std::span<SetAnswer> answers);
   void prepare_samples(const LightSamples& samples, RowSetup& setup);
 
   const LatticeMesh& mesh_;

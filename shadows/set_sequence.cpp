@@ -7,8 +7,6 @@
 namespace halfshade {
 namespace {
 
-constexpr std::uint32_t kTilted = 4;
-
 /// What makes one set differ from another.
 struct RowPlan {
   bool along_v = false;
@@ -27,15 +25,15 @@ double van_der_corput(std::uint32_t index) {
 }
 
 RowPlan plan_of(std::uint32_t side, std::uint32_t index) {
-  static constexpr std::uint32_t kGenerators[2][kTilted] = {{7, 9, 5, 11}, {19, 13, 21, 11}};  // odd: coprime to side
-  static constexpr int kTilts[kTilted] = {1, -1, -1, 1};
+  static constexpr std::uint32_t kGenerators[2][kTiltedSets] = {{7, 9, 5, 11}, {19, 13, 21, 11}};  // odd: coprime to side
+  static constexpr int kTilts[kTiltedSets] = {1, -1, -1, 1};
   const auto& generators = kGenerators[side == 32];
   RowPlan plan;
   plan.shift = fraction(index * 0.6180339887498949);
-  if (index < kTilted) {
+  if (index < kTiltedSets) {
     plan.along_v = index % 2 == 1, plan.tilt = kTilts[index], plan.generator = generators[index];
   } else {
-    plan.generator = generators[0], plan.height = van_der_corput(index - kTilted);
+    plan.generator = generators[0], plan.height = van_der_corput(index - kTiltedSets);
   }
   return plan;
 }
@@ -50,18 +48,19 @@ dvec2 place_of(const RowPlan& plan, std::uint32_t side, std::uint32_t seed, std:
 }
 
 LightSamples make_row_set(const Light& light, const ShadowConfig& config, const LocalFrame& frame, std::uint32_t side,
-                          std::uint32_t index, LightSamples samples) {
-  const RowPlan plan = plan_of(side, index);
+                          std::uint32_t first, LightSamples samples) {
+  RowPlan plan = plan_of(side, first);
   const dvec3 along = plan.along_v ? light.v : light.u, across = plan.along_v ? light.u : light.v;
   samples.axis_u = glm::normalize(along + across * (plan.tilt / static_cast<double>(side)));
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
   samples.points.clear(), samples.st.clear();
-  for (std::uint32_t row = 0; row < side; ++row) {
-    for (std::uint32_t column = 0; column < side; ++column) {
+  for (std::uint32_t set = 0; set < samples.sets; ++set) {
+    plan = plan_of(side, first + set);
+    for (std::uint32_t i = 0; i < side * side; ++i) {
+      const std::uint32_t row = i / side, column = i % side;
       const dvec2 p = place_of(plan, side, config.seed, row, column) - 0.5;
       samples.st.emplace_back(column / static_cast<double>(side), row / static_cast<double>(side));
-      samples.points.push_back(
-          snap_to_lattice(samples.center + frame.to_local_vector(along * p.x + across * p.y)));
+      samples.points.push_back(snap_to_lattice(samples.center + frame.to_local_vector(along * p.x + across * p.y)));
     }
   }
   return samples;
@@ -74,15 +73,15 @@ bool has_row_sets(const Light& light) {
          std::fabs(glm::dot(light.u, light.v)) < 1e-6 * glm::length(light.u) * glm::length(light.v);
 }
 
-LightSamples make_set(const Light& light, const ShadowConfig& asked, const LocalFrame& frame, std::uint32_t side,
-                      std::uint32_t index) {
+LightSamples make_sets(const Light& light, const ShadowConfig& asked, const LocalFrame& frame, std::uint32_t side,
+                       std::uint32_t first, std::uint32_t count) {
   ShadowConfig config = asked;
   config.light_sample_count = side * side;
-  config.sample_sets = 1, config.interleave = false, config.rotate_sets = false;
+  config.sample_sets = count, config.interleave = false, config.rotate_sets = false;
   config.pattern = SamplePattern::kLowDiscrepancy;
-  config.frame = index;
+  config.frame = first;
   LightSamples samples = make_light_samples(light, config, frame);
-  return has_row_sets(light) ? make_row_set(light, config, frame, side, index, std::move(samples)) : samples;
+  return has_row_sets(light) ? make_row_set(light, config, frame, side, first, std::move(samples)) : samples;
 }
 
 }  // namespace halfshade
