@@ -14,7 +14,7 @@
 namespace halfshade {
 namespace {
 
-constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32, 64, 128};  // the level of each round
+constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32};  // the level of each round
 constexpr std::uint32_t kWindow = 8;    // receivers before and behind, in Morton order, that a receiver is judged with
 constexpr std::uint32_t kGroup = 32;  // receivers that one certificate is tried for
 /// Goals below this need the large sets from the start; above it, they would be too much for most receivers.
@@ -182,7 +182,7 @@ void reset(std::size_t count, double max_error, AdaptiveVisibility& result) {
 void solve_all_samples(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                        const ShadowConfig& config, AdaptiveVisibility& result, ShadowStats& stats) {
   Stopwatch watch;
-  const LightSamples samples = make_sets(light, config, mesh.frame, 16, 0);
+  const LightSamples samples = make_sets(light, config, mesh.frame, 32, 0);
   VisibilityMasks masks;
   solve_masks(mesh, receivers, light, samples, config, masks, stats);
   visibility_of(masks, result.visibility);
@@ -216,7 +216,7 @@ void solve_to_error(const LatticeMesh& scene_mesh, const ReceiverArray& receiver
     return;
   }
   Stopwatch watch;
-  LevelEngine engine(opaque.get(), receivers, light, config, max_error < kLargeSetsBelow ? 32 : 16, stats);
+  LevelEngine engine(opaque.get(), receivers, light, config, max_error < kLargeSetsBelow ? 64 : 32, stats);
   result.set_size = engine.set_size(), result.pattern = engine.uses_rows() ? "tilted-rows" : "low-discrepancy";
   Progression p;
   start(receivers, p);

@@ -53,7 +53,7 @@ std::vector<vec3> region_corners(const Light& light, const LightSamples& samples
 /// Rows of the mask of `side` x `side` samples; `cell_of` says where a sample lies, or is empty for rows.
 SetAnswer read_mask(std::span<const std::uint64_t> mask, std::uint32_t side,
                     std::span<const std::uint32_t> cell_of) {
-  std::array<std::uint32_t, 32> rows{};
+  std::array<std::uint64_t, 64> rows{};
   SetAnswer answer;
   answer.visible = side * side;
   for (std::uint32_t w = 0; w < mask.size(); ++w) {
@@ -61,16 +61,16 @@ SetAnswer read_mask(std::span<const std::uint64_t> mask, std::uint32_t side,
     if (!cell_of.empty()) {
       for (std::uint64_t bits = mask[w]; bits != 0; bits &= bits - 1) {
         const std::uint32_t cell = cell_of[64 * w + static_cast<std::uint32_t>(std::countr_zero(bits))];
-        rows[cell / side] |= 1u << cell % side;
+        rows[cell / side] |= std::uint64_t{1} << cell % side;
       }
     } else {
       for (std::uint32_t bit = 0; bit < 64; bit += side) {
-        rows[(64 * w + bit) / side] = static_cast<std::uint32_t>(mask[w] >> bit) & (~0u >> (32 - side));
+        rows[(64 * w + bit) / side] = mask[w] >> bit & ~std::uint64_t{0} >> (64 - side);
       }
     }
   }
   for (std::uint32_t j = 0; j < side; ++j) {
-    const std::uint32_t across = (rows[j] ^ rows[j] >> 1) & (~0u >> (33 - side));
+    const std::uint64_t across = (rows[j] ^ rows[j] >> 1) & ~std::uint64_t{0} >> (65 - side);
     answer.boundary += static_cast<std::uint32_t>(std::popcount(across));
     if (j + 1 < side) answer.boundary += static_cast<std::uint32_t>(std::popcount(rows[j] ^ rows[j + 1]));
   }

@@ -25,9 +25,9 @@ double van_der_corput(std::uint32_t index) {
 }
 
 RowPlan plan_of(std::uint32_t side, std::uint32_t index) {
-  static constexpr std::uint32_t kGenerators[2][kTiltedSets] = {{7, 9, 5, 11}, {19, 13, 21, 11}};  // odd: coprime to side
+  static constexpr std::uint32_t kGenerators[2][kTiltedSets] = {{19, 13, 21, 11}, {39, 25, 43, 29}};  // odd: coprime to side
   static constexpr int kTilts[kTiltedSets] = {1, -1, -1, 1};
-  const auto& generators = kGenerators[side == 32];
+  const auto& generators = kGenerators[side == 64];
   RowPlan plan;
   plan.shift = fraction(index * 0.6180339887498949);
   if (index < kTiltedSets) {

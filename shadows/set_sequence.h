@@ -18,7 +18,7 @@ bool has_row_sets(const Light& light);
 /// The first sets of rows are tilted, each in its own way; sets from here on can be made and asked together.
 inline constexpr std::uint32_t kTiltedSets = 4;
 
-/// Sets `first` .. `first + count - 1` with `side` x `side` samples (side 16 or 32), as the sets of the result. `count`
+/// Sets `first` .. `first + count - 1` with `side` x `side` samples (side 32 or 64), as the sets of the result. `count`
 /// is 1 for tilted rows. `st` of rows numbers the rows and is good for find_sample_rows only.
 LightSamples make_sets(const Light& light, const ShadowConfig& config, const LocalFrame& frame, std::uint32_t side,
                        std::uint32_t first, std::uint32_t count = 1);
