@@ -15,7 +15,7 @@ namespace halfshade {
 namespace {
 
 constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32};  // the level of each round
-constexpr std::uint32_t kWindow = 8;    // receivers before and behind, in Morton order, that a receiver is judged with
+constexpr std::uint32_t kWindow = 8;  // receivers before and behind, in Morton order, that a receiver is judged with
 constexpr std::uint32_t kGroup = 32;  // receivers that one certificate is tried for
 /// Goals below this need the large sets from the start; above it, they would be too much for most receivers.
 constexpr double kLargeSetsBelow = 1.0 / 64.0;
@@ -24,7 +24,7 @@ constexpr double kLargeSetsBelow = 1.0 / 64.0;
 // that of a number in 0..1 rounded to 0 or 1, with a standard deviation of 0.29. Both factors are chosen by measurement
 // (docs/max_error.md, "How the factors were chosen").
 constexpr double kCellDeviation = 0.29;
-constexpr double kDeviations = 4.0;      // that are allowed for
+constexpr double kDeviations = 4.0;  // that are allowed for
 constexpr double kSpreadFactor = 1.5;
 constexpr double kTwoSetsFactor = 2.0;  // two sets may be wrong by chance in the same way
 constexpr double kUnseenSamples = 8.0;  // that a feature no sample has met may be worth
@@ -58,10 +58,11 @@ double spread_at(const Progression& p, std::size_t place, double before, std::ui
                   std::fabs(visibility_at(p, place, set_size) - before));
 }
 
-/// What the receivers around a place have in common: an outline that passes between their samples shows in some of them.
+/// What the receivers around a place have in common: an outline that passes between their samples shows in some of
+/// them.
 struct Surroundings {
   double boundary = 0.0, spread = 0.0;  // largest per set, largest of those at the same level
-  bool constant = true;                     // all see all of the light, or all see nothing of it
+  bool constant = true;                 // all see all of the light, or all see nothing of it
 };
 
 Surroundings look_around(const Progression& p, std::size_t place, std::uint32_t set_size) {
@@ -198,7 +199,8 @@ void solve_all_samples(const LatticeMesh& mesh, const ReceiverArray& receivers, 
 
 void check_max_error(double max_error) {
   if (max_error >= kSmallestMaxError && max_error <= kLargestMaxError) return;
-  throw Error(ErrorCode::kUsage, "largest error of visibility: " + std::to_string(max_error) + " is not in 1/4096..1/4");
+  throw Error(ErrorCode::kUsage,
+              "largest error of visibility: " + std::to_string(max_error) + " is not in 1/4096..1/4");
 }
 
 void solve_to_error(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,

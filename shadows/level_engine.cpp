@@ -21,9 +21,9 @@ struct RowSetup {
 
 namespace {
 
-constexpr std::size_t kCluster = 64;   // receivers that share a list of leaves
+constexpr std::size_t kCluster = 64;  // receivers that share a list of leaves
 constexpr std::uint32_t kSetsAtOnce = 16;
-constexpr double kGrazing = 1e-5;      // as in exact_engine.cpp: nearer to the light's plane the row kernel is not used
+constexpr double kGrazing = 1e-5;  // as in exact_engine.cpp: nearer to the light's plane the row kernel is not used
 constexpr double kAround = 1.0 + 1e-5;  // corners of the light's region are moved outwards by this factor
 
 /// [set][place in which]
@@ -51,8 +51,7 @@ std::vector<vec3> region_corners(const Light& light, const LightSamples& samples
 }
 
 /// Rows of the mask of `side` x `side` samples; `cell_of` says where a sample lies, or is empty for rows.
-SetAnswer read_mask(std::span<const std::uint64_t> mask, std::uint32_t side,
-                    std::span<const std::uint32_t> cell_of) {
+SetAnswer read_mask(std::span<const std::uint64_t> mask, std::uint32_t side, std::span<const std::uint32_t> cell_of) {
   std::array<std::uint64_t, 64> rows{};
   SetAnswer answer;
   answer.visible = side * side;
@@ -101,15 +100,16 @@ bool segment_meets(const dvec3& a, const dvec3& b, const BlockerTree::Node& node
   return from <= to;
 }
 
-/// No segment from the box to the light meets the triangle: it lies on one side of the triangle's plane, or beyond one of
-/// its edges. The determinants are linear in either end of the segment, so corners speak for all points.
+/// No segment from the box to the light meets the triangle: it lies on one side of the triangle's plane, or beyond one
+/// of its edges. The determinants are linear in either end of the segment, so corners speak for all points.
 bool hides_nothing(const LatticeMesh& mesh, std::uint32_t triangle, std::span<const vec3> from,
                    std::span<const vec3> light) {
   const std::array<vec3, 3> corner = mesh.corners(triangle);
   const auto side_of = [&](const vec3& p) { return orient3d(corner[0], corner[1], corner[2], p); };
   int low = 1, high = -1, light_low = 1, light_high = -1;
   for (const vec3& r : from) low = std::min(low, side_of(r)), high = std::max(high, side_of(r));
-  for (const vec3& l : light) light_low = std::min(light_low, side_of(l)), light_high = std::max(light_high, side_of(l));
+  for (const vec3& l : light)
+    light_low = std::min(light_low, side_of(l)), light_high = std::max(light_high, side_of(l));
   if ((low >= 0 && light_low >= 0) || (high <= 0 && light_high <= 0)) return true;
   if (low != high) return false;  // receivers on both sides: no edge is oriented for all of them
   for (std::size_t k = 0; k < 3; ++k) {
@@ -304,7 +304,8 @@ bool LevelEngine::all_lit(std::span<const std::uint32_t> which) const {
     const BlockerTree::Node& node = tree_.nodes[stack.back()];
     stack.pop_back();
     for (std::uint32_t i = 0; i < node.count; ++i) {
-      const Box child{{node.low[0][i], node.low[1][i], node.low[2][i]}, {node.high[0][i], node.high[1][i], node.high[2][i]}};
+      const Box child{{node.low[0][i], node.low[1][i], node.low[2][i]},
+                      {node.high[0][i], node.high[1][i], node.high[2][i]}};
       if (!shaft.may_meet(child)) continue;
       if ((node.child[i] & BlockerTree::kLeafBit) == 0) {
         stack.push_back(node.child[i]);

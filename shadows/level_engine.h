@@ -39,8 +39,7 @@ class LevelEngine {
   void solve_rows(const LightSamples& samples, std::span<const std::uint32_t> which, std::span<SetAnswer> answers);
   void solve_row_side(const struct RowSetup& setup, const LightFrame& frame, std::span<const std::uint32_t> which,
                       std::span<SetAnswer> answers);
-  void solve_generally(const LightSamples& samples, std::span<const std::uint32_t> which,
-                       std::span<SetAnswer> answers);
+  void solve_generally(const LightSamples& samples, std::span<const std::uint32_t> which, std::span<SetAnswer> answers);
   void prepare_samples(const LightSamples& samples, RowSetup& setup);
 
   const LatticeMesh& mesh_;

@@ -25,7 +25,8 @@ double van_der_corput(std::uint32_t index) {
 }
 
 RowPlan plan_of(std::uint32_t side, std::uint32_t index) {
-  static constexpr std::uint32_t kGenerators[2][kTiltedSets] = {{19, 13, 21, 11}, {39, 25, 43, 29}};  // odd: coprime to side
+  static constexpr std::uint32_t kGenerators[2][kTiltedSets] = {{19, 13, 21, 11},
+                                                                {39, 25, 43, 29}};  // odd: coprime to side
   static constexpr int kTilts[kTiltedSets] = {1, -1, -1, 1};
   const auto& generators = kGenerators[side == 64];
   RowPlan plan;

@@ -92,8 +92,7 @@ void add_reference_sets(const LatticeMesh& mesh, const ReceiverArray& receivers,
 }  // namespace
 
 std::vector<double> converged_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                                         const ShadowConfig& asked, double goal,
-                                         std::span<const std::uint32_t> which) {
+                                         const ShadowConfig& asked, double goal, std::span<const std::uint32_t> which) {
   ShadowConfig config = asked;
   config.method = ShadowMethod::kExact;
   config.pattern = SamplePattern::kLowDiscrepancy;
@@ -145,15 +144,9 @@ ordered_json max_error_json(const AdaptiveVisibility& r) {
                       {"ms", level.ms},
                       {"largest_bound_left", level.largest_bound}});
   }
-  return {{"goal", r.max_error},
-          {"bound_kept", r.bound_kept},
-          {"pattern", r.pattern},
-          {"set_size", r.set_size},
-          {"proved_lit", r.proved_lit},
-          {"proved_umbra", r.proved_umbra},
-          {"exhausted", r.exhausted},
-          {"samples_asked", r.samples_asked},
-          {"levels", levels}};
+  return {{"goal", r.max_error},      {"bound_kept", r.bound_kept},       {"pattern", r.pattern},
+          {"set_size", r.set_size},   {"proved_lit", r.proved_lit},       {"proved_umbra", r.proved_umbra},
+          {"exhausted", r.exhausted}, {"samples_asked", r.samples_asked}, {"levels", levels}};
 }
 
 ordered_json max_error_check_json(const MaxErrorCheck& c) {
@@ -172,12 +165,11 @@ void print_max_error(std::FILE* out, const AdaptiveVisibility& r) {
   fmt::print(out,
              "error      goal {:.6f}; bound kept {:.6f} (estimate), {} lit and {} umbra by proof; {:.0f} samples per "
              "receiver on average ({})\n",
-             r.max_error, r.bound_kept, r.proved_lit, r.proved_umbra,
-             static_cast<double>(r.samples_asked) / receivers, r.pattern);
+             r.max_error, r.bound_kept, r.proved_lit, r.proved_umbra, static_cast<double>(r.samples_asked) / receivers,
+             r.pattern);
   for (const ErrorLevel& level : r.levels) {
     fmt::print(out, "  {:5} samples: {} receivers, {} proved, {} settled, {:.1f} ms, largest bound left {:.5f}\n",
-               level.samples_per_receiver, level.receivers, level.proved, level.settled, level.ms,
-               level.largest_bound);
+               level.samples_per_receiver, level.receivers, level.proved, level.settled, level.ms, level.largest_bound);
   }
   if (r.exhausted > 0) fmt::print(out, "           {} receivers stay above the goal\n", r.exhausted);
 }

@@ -14,12 +14,11 @@ double parse_max_error(const std::string& text);
 ReceiverArray receivers_of_whole_light(const GBuffer& gbuffer, const Light& light, const ShadowConfig& config,
                                        const LocalFrame& frame);
 
-/// Visibility of receivers `which` from sets of 1,024 low-discrepancy samples by method exact, sets that no run uses: 16
-/// of them, and 64 or 256 where four times their standard error is above half of `goal`.
+/// Visibility of receivers `which` from sets of 1,024 low-discrepancy samples by method exact, sets that no run uses:
+/// 16 of them, and 64 or 256 where four times their standard error is above half of `goal`.
 inline constexpr std::uint32_t kConvergedSamples = 16384;
 std::vector<double> converged_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                                         const ShadowConfig& config, double goal,
-                                         std::span<const std::uint32_t> which);
+                                         const ShadowConfig& config, double goal, std::span<const std::uint32_t> which);
 
 /// A share of the receivers against the reference.
 struct MaxErrorCheck {

@@ -88,8 +88,7 @@ void run_once(const Subject& s, double goal, double time_limit, Candidate& c) {
   try {
     if (c.adaptive) {
       AdaptiveVisibility result;
-      solve_to_error(s.pipeline->mesh, s.receivers, *s.light, config, goal, result,
-                     stats);
+      solve_to_error(s.pipeline->mesh, s.receivers, *s.light, config, goal, result, stats);
       c.visibility = std::move(result.visibility);
     } else {
       const LightSamples samples = make_light_samples(*s.light, config, s.pipeline->mesh.frame);
@@ -167,8 +166,7 @@ ordered_json candidates_json(const std::vector<Candidate>& all, double goal) {
 }
 
 void print_candidates(const std::vector<Candidate>& all, const Candidate* best, double goal) {
-  fmt::print("  {:32} {:>10} {:>10} {:>9} {:>9} {:>9}\n", "setting", "shadow ms", "build ms", "rmse", "max",
-             "% above");
+  fmt::print("  {:32} {:>10} {:>10} {:>9} {:>9} {:>9}\n", "setting", "shadow ms", "build ms", "rmse", "max", "% above");
   for (const Candidate& c : all) {
     if (!c.reason.empty()) {
       fmt::print("  {:32} {}\n", c.name, c.reason);
@@ -210,10 +208,14 @@ int run(RecommendOptions o) {
                                                     : "none of these keeps the goal on every receiver");
   }
   if (o.json) {
-    const ordered_json json = {{"schema", "halfshade.recommend/1"}, {"version", HALFSHADE_VERSION},
-                               {"command", o.command_line},         {"machine", machine_json()},
-                               {"scene", o.scene},                  {"size", o.size},
-                               {"max_error", o.goal},               {"lights", lights}};
+    const ordered_json json = {{"schema", "halfshade.recommend/1"},
+                               {"version", HALFSHADE_VERSION},
+                               {"command", o.command_line},
+                               {"machine", machine_json()},
+                               {"scene", o.scene},
+                               {"size", o.size},
+                               {"max_error", o.goal},
+                               {"lights", lights}};
     std::fputs((json.dump(2) + "\n").c_str(), stdout);
   }
   return found_all ? kOk : kDifferent;

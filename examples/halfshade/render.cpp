@@ -16,11 +16,11 @@
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/shading.h"
 #include "render_stream.h"
-#include "shortcuts.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/oracle.h"
 #include "shadows/solver.h"
 #include "shadows/transmittance.h"
+#include "shortcuts.h"
 #include "stats_json.h"
 
 namespace halfshade {
@@ -158,8 +158,8 @@ void solve_light_to_error(Render& render, const Light& light) {
   result.receiver_visibility = result.adaptive.visibility;
   spread_visibility(render.gbuffer, result);
   if (options.verify_percent <= 0.0) return;
-  result.check = check_max_error_run(render.mesh, result.receivers, light, config, result.adaptive,
-                                     options.verify_percent);
+  result.check =
+      check_max_error_run(render.mesh, result.receivers, light, config, result.adaptive, options.verify_percent);
 }
 
 void solve_light(Render& render, const Light& light) {
@@ -429,8 +429,7 @@ int run(RenderOptions options) {
     solve_light(render, light);
     LightResult& l = render.lights.back();
     if (!(o.stats || o.measure_shortcuts) || !promises_exactness(shadow_config(o))) continue;
-    l.shortcuts =
-        list_shortcuts(render.mesh, l.receivers, light, shadow_config(o), l.stats, o.measure_shortcuts);
+    l.shortcuts = list_shortcuts(render.mesh, l.receivers, light, shadow_config(o), l.stats, o.measure_shortcuts);
   }
   if (!o.output.empty()) write_picture_file(render);
   if (!o.dump.empty()) write_dumps(render);

@@ -63,8 +63,13 @@ std::uint64_t count_perforated(const LatticeMesh& mesh) {
 
 Shortcut back_faces(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                     const ShadowConfig& config, const ShadowStats& stats, bool measure) {
-  Shortcut s{"back-face-only casters", stats.certified_blockers > 0, stats.certified_blockers, stats.triangles,
-             "triangles", {}, "closed, consistently wound meshes"};
+  Shortcut s{"back-face-only casters",
+             stats.certified_blockers > 0,
+             stats.certified_blockers,
+             stats.triangles,
+             "triangles",
+             {},
+             "closed, consistently wound meshes"};
   if (!measure || !s.on) return s;
   ShadowConfig all_faces = config;
   all_faces.back_face_casters = false;
@@ -75,7 +80,12 @@ Shortcut back_faces(const LatticeMesh& mesh, const ReceiverArray& receivers, con
 
 Shortcut single_sided(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                       const ShadowConfig& config, const LightSamples& samples, bool measure) {
-  Shortcut s{"single-sided light", samples.one_sided, samples.one_sided, 1, "lights", {},
+  Shortcut s{"single-sided light",
+             samples.one_sided,
+             samples.one_sided,
+             1,
+             "lights",
+             {},
              "what is behind the light is not solved"};
   if (!measure || !s.on) return s;
   Light both = light;
@@ -88,9 +98,15 @@ Shortcut single_sided(const LatticeMesh& mesh, const ReceiverArray& receivers, c
 Shortcut hard_shadow(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                      const ShadowConfig& config, const LightSamples& samples, bool measure) {
   const bool point = samples.points.size() == 1 && samples.st.size() <= 1 && light.shape == LightShape::kPoint;
-  Shortcut s{"hard shadow", point, point, 1, "lights", {},
-             point ? "a point needs one sample"
-                   : "off: in a penumbra one sample is wrong by up to 1, however narrow it is; gain is that of 1 sample"};
+  Shortcut s{"hard shadow",
+             point,
+             point,
+             1,
+             "lights",
+             {},
+             point
+                 ? "a point needs one sample"
+                 : "off: in a penumbra one sample is wrong by up to 1, however narrow it is; gain is that of 1 sample"};
   if (!measure || point || light.shape == LightShape::kSamples) return s;
   ShadowConfig one = config;
   one.light_sample_count = 1;
@@ -115,16 +131,36 @@ std::vector<Shortcut> list_shortcuts(const LatticeMesh& scene_mesh, const Receiv
   all.push_back(single_sided(mesh, receivers, light, config, samples, measure));
   if (samples.flat) {
     const std::uint64_t crossing = count_crossing_plane(mesh, samples);
-    all.push_back({"no clipping", crossing == 0, triangles - crossing, triangles, "triangles", {},
+    all.push_back({"no clipping",
+                   crossing == 0,
+                   triangles - crossing,
+                   triangles,
+                   "triangles",
+                   {},
                    "do not cross the light's plane; decided per triangle, no switch"});
   }
-  all.push_back({"float only", stats.exact_fallbacks == 0, stats.sample_tests - stats.exact_fallbacks,
-                 stats.sample_tests, "sample tests", {}, "settled by the float filter; decided per test, no switch"});
+  all.push_back({"float only",
+                 stats.exact_fallbacks == 0,
+                 stats.sample_tests - stats.exact_fallbacks,
+                 stats.sample_tests,
+                 "sample tests",
+                 {},
+                 "settled by the float filter; decided per test, no switch"});
   all.push_back(hard_shadow(mesh, receivers, light, config, samples, measure));
-  all.push_back({"no alpha path", perforated == 0, triangles - perforated, triangles, "triangles", {},
+  all.push_back({"no alpha path",
+                 perforated == 0,
+                 triangles - perforated,
+                 triangles,
+                 "triangles",
+                 {},
                  "without opacity map; decided per triangle, no switch"});
-  all.push_back({"lit clusters", stats.clusters_lit > 0, stats.clusters_lit, (receivers.size() + 63) / 64,
-                 "clusters", {}, "no blocker's box in the shaft to the light; over all rounds with --max-error"});
+  all.push_back({"lit clusters",
+                 stats.clusters_lit > 0,
+                 stats.clusters_lit,
+                 (receivers.size() + 63) / 64,
+                 "clusters",
+                 {},
+                 "no blocker's box in the shaft to the light; over all rounds with --max-error"});
   return all;
 }
 

@@ -97,8 +97,8 @@ TEST_CASE("behind a wire thinner than the samples' distance the error is below t
 
 TEST_CASE("what is wholly lit or hidden by one triangle is proved") {
   const std::vector<Receiver> receivers = receivers_at(ground_points(16, 1.0));
-  const AdaptiveVisibility lit = solved(scene_of(quad({9, 1, 9}, {9, 2, 9}, {9, 2, 8}, {9, 1, 8})), receivers,
-                                        frame_light(), 1.0 / 256);
+  const AdaptiveVisibility lit =
+      solved(scene_of(quad({9, 1, 9}, {9, 2, 9}, {9, 2, 8}, {9, 1, 8})), receivers, frame_light(), 1.0 / 256);
   CHECK(lit.proved_lit == receivers.size());
   CHECK(lit.bound_kept == 0.0);
   CHECK(std::all_of(lit.visibility.begin(), lit.visibility.end(), [](float v) { return v == 1.0f; }));
