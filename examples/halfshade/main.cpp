@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   halfshade::add_chart(app, joined(argc, argv));
   halfshade::add_atlas(app, joined(argc, argv), exit_code);
   halfshade::add_info(app);
+  halfshade::add_recommend(app, joined(argc, argv), exit_code);
   halfshade::add_compare(app, exit_code);
   halfshade::add_verify(app, exit_code);
   halfshade::add_merge(app, joined(argc, argv), exit_code);

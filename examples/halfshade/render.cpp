@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <optional>
 
 #include "dump.h"
 #include "halfshade/emission.h"
@@ -18,6 +19,7 @@
 #include "shadows/solver.h"
 #include "shadows/thin_features.h"
 #include "shadows/transmittance.h"
+#include "shortcuts.h"
 #include "stats_json.h"
 
 namespace halfshade {
@@ -143,7 +145,33 @@ void finish_light(Render& render, const Light& light, LightResult& result) {
 
 namespace {
 
+/// --max-error: visibility of the whole light instead of that of a number of samples.
+void solve_light_to_error(Render& render, const Light& light) {
+  const RenderOptions& options = render.options;
+  ShadowConfig config = shadow_config(options);
+  LightResult& result = render.lights.emplace_back();
+  Stopwatch watch;
+  result.receivers = receivers_of_whole_light(render.gbuffer, light, config, render.mesh.frame);
+  result.samples_ms = watch.lap();
+  {
+    Progress progress("shadows of " + light.name, options.quiet);
+    config.progress = [&progress](double done) { return progress(done); };
+    solve_to_error(render.mesh, result.receivers, light, config, options.error_goal, result.adaptive, result.stats);
+    config.progress = nullptr;
+  }
+  result.shadow_ms = watch.lap();
+  result.receiver_visibility = result.adaptive.visibility;
+  spread_visibility(render.gbuffer, result);
+  if (options.verify_percent <= 0.0) return;
+  result.check =
+      check_max_error_run(render.mesh, result.receivers, light, config, result.adaptive, options.verify_percent);
+}
+
 void solve_light(Render& render, const Light& light) {
+  if (render.options.error_goal > 0.0) {
+    solve_light_to_error(render, light);
+    return;
+  }
   ShadowConfig config = shadow_config(render.options);
   LightResult& result = add_light(render, light);
   Stopwatch watch;
@@ -217,6 +245,9 @@ ordered_json light_json(const Render& render, std::size_t index) {
   const std::string assumptions = method_assumptions(shadow_config(render.options), render.source.view.lights[index]);
   if (!assumptions.empty()) json["assumes"] = assumptions;
   if (!light.masks.words.empty()) json["mask_hash"] = light.masks.hash();
+  if (render.options.error_goal > 0.0) json["max_error"] = max_error_json(light.adaptive);
+  if (!light.shortcuts.empty()) json["shortcuts"] = shortcuts_json(light.shortcuts);
+  if (light.check.receivers > 0) json["verify"] = max_error_check_json(light.check);
   if (light.verified > 0)
     json["verify"] = {{"receivers", light.verified},
                       {"bits", light.verified_bits},
@@ -345,10 +376,36 @@ void print_summary(const Render& render) {
         fmt::print(out, "           light through translucent triangles wrong at {} receivers\n", l.wrong_lights);
       }
     }
+    if (render.options.error_goal > 0.0) print_max_error(out, l.adaptive);
+    if (l.check.receivers > 0) {
+      fmt::print(out,
+                 "verify     {} receivers against {} samples: {} above the goal, {} of {} proofs wrong; off by {:.5f} "
+                 "(rms), {:.5f} (largest)\n",
+                 l.check.receivers, kConvergedSamples, l.check.violations, l.check.wrong_proofs, l.check.proofs,
+                 l.check.rmse, l.check.largest);
+    }
     if (!l.masks.words.empty()) fmt::print(out, "mask hash  {}\n", l.masks.hash());
+    print_shortcuts(out, l.shortcuts);
     if (render.options.stats) print_stats(out, s);
   }
   if (!render.options.output.empty()) fmt::print(out, "written    {}\n", render.options.output);
+}
+
+/// What --max-error does not go with.
+void check_error_goal(const RenderOptions& o) {
+  const PipelineOptions defaults;
+  if (o.method != defaults.method || o.pattern != defaults.pattern || o.light_samples != defaults.light_samples ||
+      o.sets != defaults.sets || o.interleave || o.rotate) {
+    usage_error("--max-error chooses method, pattern, sets and number of samples itself");
+  }
+  if (!o.dump.empty()) usage_error("--max-error: --dump needs the same samples for all receivers");
+}
+
+void check_error_goal(const Render& render) {
+  if (!render.panes.empty()) usage_error("--max-error: the scene has translucent triangles");
+  for (const Light& light : render.source.view.lights) {
+    if (!light.emission_image.empty()) usage_error("--max-error: light '" + light.name + "' has an emission image");
+  }
 }
 
 }  // namespace
@@ -372,6 +429,7 @@ int finish_render(Render& render) {
   }
   const bool must_be_exact = promises_exactness(shadow_config(o));
   for (const LightResult& light : render.lights) {
+    if (light.check.violations + light.check.wrong_proofs > 0) return kDifferent;
     if (must_be_exact && light.wrong_bits + light.wrong_lights > 0) return kDifferent;
   }
   return kOk;
@@ -383,7 +441,12 @@ int run(const RenderOptions& options) {
   Render render;
   render.options = options;
   check_render_options(options);
+  if (options.max_error) {
+    render.options.error_goal = parse_max_error(*options.max_error);
+    check_error_goal(options);
+  }
   open_pipeline(options, 0.0, render);
+  if (render.options.error_goal > 0.0) check_error_goal(render);
   if (!render.panes.empty() && !yields_masks(shadow_config(options))) {
     fmt::print(stderr,
                "halfshade: warning: {} translucent triangles: {} does not know which light samples it sees; its "
@@ -397,13 +460,20 @@ int run(const RenderOptions& options) {
     journal.remove();
     return code;
   }
-  for (const Light& light : render.source.view.lights) solve_light(render, light);
+  for (const Light& light : render.source.view.lights) {
+    solve_light(render, light);
+    LightResult& l = render.lights.back();
+    if (!(options.stats || options.measure_shortcuts) || !promises_exactness(shadow_config(options))) continue;
+    l.shortcuts =
+        list_shortcuts(render.mesh, l.receivers, light, shadow_config(options), l.stats, options.measure_shortcuts);
+  }
   return finish_render(render);
 }
 
 /// The default method means hpc here.
 int run_streamed(const RenderOptions& o) {
   if (o.verify_percent > 0.0 || !o.dump.empty()) usage_error("--stream: --verify and --dump need the whole scene");
+  if (o.max_error) usage_error("--stream: --max-error needs the whole scene");
   StreamRenderOptions streamed = o.streamed;
   static_cast<PipelineOptions&>(streamed) = o;
   streamed.output = o.output, streamed.json = o.json, streamed.stats = o.stats;
@@ -427,7 +497,12 @@ void add_render(CLI::App& app, const std::string& command_line, int& exit_code) 
                    "Receivers that look for features finer than the light's samples, and warn (0 = none)")
       ->check(CLI::Range(0, 65536))
       ->capture_default_str();
-  verb->add_flag("--stats", o->stats, "Print every counter of the method");
+  verb->add_flag("--stats", o->stats, "Print every counter of the method, and its shortcuts");
+  verb->add_flag("--measure-shortcuts", o->measure_shortcuts,
+                 "Exact methods: list the shortcuts with what each gains, from runs with and without it");
+  verb->add_option("--max-error", o->max_error,
+                   "Largest error of visibility of the whole light, 1/4096..1/4: 1/256, 0.004 or 0.4%; samples are "
+                   "spent where it takes them");
   verb->add_flag("--resume", o->resume,
                  "Keep finished bands in OUTPUT.journal and go on from those of a run that was stopped");
   verb->add_option("--band-seconds", o->band_seconds, "--resume: work between two savings, 0.01..3600")

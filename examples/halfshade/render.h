@@ -1,10 +1,14 @@
 // One picture of a scene, from options to files: what render, its parts and journal, and merge share.
 #pragma once
 
+#include <optional>
+
+#include "max_error.h"
 #include "picture.h"
 #include "pipeline.h"
 #include "render_stream.h"
 #include "shadows/thin_features.h"
+#include "shortcuts.h"
 
 namespace halfshade {
 
@@ -12,7 +16,9 @@ struct RenderOptions : PipelineOptions {
   std::string output, json, dump;
   double verify_percent = 0.0;
   std::uint32_t probes = 64;
-  bool stats = false, stream = false;
+  std::optional<std::string> max_error;
+  double error_goal = 0.0;  // what max_error says; 0 = none
+  bool stats = false, stream = false, measure_shortcuts = false;
   bool resume = false;  // journal.h
   double band_seconds = 1.0;
   std::string part, split = "crop";  // render_part.h
@@ -37,6 +43,9 @@ struct LightResult {
   std::uint64_t verified = 0, verified_bits = 0, wrong_bits = 0;
   double rms_error = 0.0, largest_error = 0.0;  // of visibility, over the verified receivers
   double mean_error = 0.0;                      // with its sign: positive is too light
+  AdaptiveVisibility adaptive;                  // with --max-error, which needs no masks
+  MaxErrorCheck check;                          // of it
+  std::vector<Shortcut> shortcuts;              // with --stats or --measure-shortcuts
   std::uint64_t wrong_lights = 0;               // verified receivers whose transmitted light has a wrong bit
 };
 

@@ -110,6 +110,7 @@ std::string crop_text(const PixelWindow& window, std::uint32_t k, const PartRang
 void check_partial_options(const RenderOptions& o) {
   if (o.part.empty() && !o.resume) return;
   if (o.stream) usage_error("--stream goes with neither --part nor --resume");
+  if (o.max_error) usage_error("--max-error goes with neither --part nor --resume");
   if (!(o.band_seconds >= 0.01 && o.band_seconds <= 3600.0))
     usage_error(fmt::format("--band-seconds {} is not in 0.01..3600", o.band_seconds));
   if (o.output.empty()) usage_error("--part and --resume need an --output");

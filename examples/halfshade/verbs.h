@@ -15,6 +15,7 @@ void add_accumulate(CLI::App& app, const std::string& command_line);
 void add_chart(CLI::App& app, const std::string& command_line);
 void add_atlas(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_info(CLI::App& app);
+void add_recommend(CLI::App& app, const std::string& command_line, int& exit_code);
 void add_compare(CLI::App& app, int& exit_code);
 void add_verify(CLI::App& app, int& exit_code);
 void add_merge(CLI::App& app, const std::string& command_line, int& exit_code);

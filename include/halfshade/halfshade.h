@@ -12,6 +12,7 @@
 #pragma once
 
 #include "halfshade/accumulation.h"
+#include "halfshade/adaptive.h"
 #include "halfshade/depth_complexity.h"
 #include "halfshade/emission.h"
 #include "halfshade/error.h"
