@@ -11,6 +11,7 @@ namespace halfshade {
 struct GBuffer {
   std::uint32_t width = 0, height = 0;  // the whole picture, in samples
   PixelWindow window;                   // the part held here, in samples
+  double reach = 1.0;                   // power of two, at least every |coordinate| of what was drawn; local frame
   std::vector<std::uint32_t> triangle;  // visible triangle, or kNone
   std::vector<dvec3> position;          // local frame, interpolated in double, not snapped
   std::vector<vec3> geometric_normal;   // unit, on the camera's side of the triangle

@@ -37,6 +37,9 @@ void require(bool condition, const Light& light, const char* what) {
 }
 
 void check(const Light& light, const ShadowConfig& config) {
+  if (light.shape == LightShape::kSun) {
+    throw Error(ErrorCode::kUsage, "light '" + light.name + "': a sun has no place of its own; place_sun() gives it one");
+  }
   if (config.light_sample_count < 1 || config.light_sample_count > 4096) {
     throw Error(ErrorCode::kUsage,
                 "light samples: " + std::to_string(config.light_sample_count) + " is not in 1..4096");

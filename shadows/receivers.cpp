@@ -17,11 +17,12 @@ std::uint32_t set_of_entry(const GBuffer& gbuffer, const LightSamples& samples, 
 ReceiverArray receivers_of_range(const GBuffer& gbuffer, const LightSamples& samples, std::uint32_t seed,
                                  std::size_t begin, std::size_t end) {
   ReceiverArray part;
+  const double offset = std::min(kReceiverOffset, kReceiverOffsetOfScene * gbuffer.reach);
   for (std::size_t i = begin; i != end; ++i) {
     if (gbuffer.triangle[i] == kNone) continue;
     const auto entry = static_cast<std::uint32_t>(i);
     const vec3 normal = gbuffer.geometric_normal[i];
-    const vec3 position = snap_to_lattice(gbuffer.position[i] + dvec3(normal) * kReceiverOffset);
+    const vec3 position = snap_to_lattice(gbuffer.position[i] + dvec3(normal) * offset);
     const std::uint32_t set = set_of_entry(gbuffer, samples, seed, entry);
     if (faces_away(position, normal, samples, set)) continue;
     part.push_back(position, normal, gbuffer.triangle[i], entry, static_cast<std::uint8_t>(set));

@@ -20,8 +20,9 @@ struct ReceiverArray {
 };
 
 /// Distance by which a receiver is lifted off its triangle along the geometric normal: 4 ulp of a coordinate of size 1,
-/// 2^-21 of the scene (stability.md b8).
-inline constexpr double kReceiverOffset = 0x1p-21;
+/// 2^-21 of the frame (stability.md b8), but no more than 2^-18 of the scene where far lights make the scene small in
+/// its frame.
+inline constexpr double kReceiverOffset = 0x1p-21, kReceiverOffsetOfScene = 0x1p-18;
 
 /// Does the light send nothing to this receiver whatever blocks it? True where every sample lies at or below the
 /// receiver's tangent plane, or the receiver lies at or behind a one-sided light. A pure function of rounded inputs.

@@ -7,7 +7,7 @@
 
 namespace halfshade {
 
-enum class LightShape { kPoint, kRectangle, kDisk, kSphere, kSamples, kEllipsoid, kPolygon };
+enum class LightShape { kPoint, kRectangle, kDisk, kSphere, kSamples, kEllipsoid, kPolygon, kSun };
 
 /// Colours of light over a rectangle, linear RGB >= 0. The image is seen as from the lit side with u to the right and v
 /// upwards: row 0 is the edge at +v / 2.
@@ -28,6 +28,7 @@ struct EmissionImage {
 ///   p[k];
 ///               axes that are not orthogonal are allowed
 ///   kPolygon    points: 3..64 corners of a flat, convex polygon; faces the side that sees them counter-clockwise
+///   kSun        normal (the way its light travels), angular_diameter_deg; a description that place_sun() makes a light
 /// One-sided flat lights give no light to receivers at or behind their plane.
 struct Light {
   std::string name = "light";
@@ -41,7 +42,19 @@ struct Light {
   vec3 emission{1.0f};
   std::array<dvec3, 3> axes{dvec3(1, 0, 0), dvec3(0, 1, 0), dvec3(0, 0, 1)};
   EmissionImage emission_image;  // kRectangle only: replaces `emission` unless empty (emission.h)
+  double angular_diameter_deg = 0.533;  // kSun: of the disk as seen from the scene, 0 < angle <= 60
 };
+
+/// Distance of a placed sun from the middle of its box, in half diagonals of that box.
+inline constexpr double kSunDistance = 4096.0;
+
+/// The sun as a light with a place: a one-sided disk that faces the box's middle (world space, lowest and highest
+/// corner) from kSunDistance half diagonals away and shows the angular diameter there. Everywhere in the box its centre
+/// is seen within atan(1 / kSunDistance) = 0.014 degrees of its direction: the shadow of something at height h above a
+/// surface lies within h / kSunDistance of where parallel light puts it. A box of size zero counts as one of half
+/// diagonal 1. Lights of other shapes are returned as they are. Throws Error{kBadInput} for a direction of length zero,
+/// an angle out of range or a box that is not finite.
+Light place_sun(const Light& light, const dvec3& low, const dvec3& high);
 
 /// Pinhole camera, right-handed: looks from `eye` towards `target`; image row 0 is the top.
 struct Camera {
