@@ -85,7 +85,8 @@ TEST_CASE("all exact methods give the oracle's bits under the sun") {
 }
 
 TEST_CASE("a far sun does not lift a picture's receivers far off their surface") {
-  const Scene scene = scene_of(joined(box({-1, 0, -1}, {1, 1, 1}), quad({-4, 0, 4}, {4, 0, 4}, {4, 0, -4}, {-4, 0, -4})));
+  const Scene scene =
+      scene_of(joined(box({-1, 0, -1}, {1, 1, 1}), quad({-4, 0, 4}, {4, 0, 4}, {4, 0, -4}, {-4, 0, -4})));
   const Light disk = place_sun(sun({0.5, -1.0, 0.3}), {-4, 0, -4}, {4, 1, 4});
   Camera camera;
   camera.eye = {0, 6, 9};
