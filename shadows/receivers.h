@@ -1,6 +1,9 @@
 // The points that ask for light, made once and shared by every method, the oracle and the rivals.
 #pragma once
 
+#include <algorithm>
+
+#include "halfshade/shadow_solver.h"
 #include "rasterizer/core/mesh.h"
 #include "rasterizer/gbuffer.h"
 #include "shadows/light_samples.h"
@@ -16,13 +19,24 @@ struct ReceiverArray {
   std::vector<std::uint8_t> set;        // which set of light samples it uses
 
   std::size_t size() const { return position.size(); }
+  void resize(std::size_t count);
   void push_back(const vec3& p, const vec3& n, std::uint32_t own, std::uint32_t from, std::uint8_t light_set);
 };
 
 /// Distance by which a receiver is lifted off its triangle along the geometric normal: 4 ulp of a coordinate of size 1,
 /// 2^-21 of the frame (stability.md b8), but no more than 2^-18 of the scene where far lights make the scene small in
 /// its frame.
-inline constexpr double kReceiverOffset = 0x1p-21, kReceiverOffsetOfScene = 0x1p-18;
+inline constexpr double kReceiverOffset = kReceiverLift, kReceiverOffsetOfScene = 0x1p-18;
+
+/// Lifted and snapped; `reach` is GBuffer::reach.
+inline vec3 lifted_receiver(const dvec3& position, const vec3& normal, double reach) {
+  return snap_to_lattice(position + dvec3(normal) * std::min(kReceiverOffset, kReceiverOffsetOfScene * reach));
+}
+
+/// Does the receiver lie at or behind a one-sided light?
+inline bool behind_light(const vec3& position, const LightSamples& samples) {
+  return samples.one_sided && glm::dot(dvec3(position) - samples.center, samples.axis_n) <= 0.0;
+}
 
 /// Does the light send nothing to this receiver whatever blocks it? True where every sample lies at or below the
 /// receiver's tangent plane, or the receiver lies at or behind a one-sided light. A pure function of rounded inputs.

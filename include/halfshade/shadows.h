@@ -15,7 +15,7 @@ namespace halfshade {
 /// How light samples are spread over the light's area (docs/sampling.md).
 enum class SamplePattern {
   kRows,            // rows of equal height share v, each row shifted by its own lattice offset
-  kUniform,         // cell centres
+  kUniform,         // cell centres, row by row: of k * k samples, i is in column i mod k of row i / k
   kStratified,      // one jittered sample per cell
   kLowDiscrepancy,  // scrambled (0,2)-sequence; nested: the first samples of a larger number are those of a smaller one
   kPoissonDisk,     // no two samples near each other (measured on the torus); nested as well
