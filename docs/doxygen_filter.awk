@@ -2,9 +2,20 @@
 #   //  at the top of the file         becomes the file's description, that of halfshade.h the main page
 #   code;  // text                     becomes code;  ///< text, together with the comment lines below it
 #   two declarations in one line       become two, each with the line's comment
-# Nothing else changes: comments inside function bodies keep their slashes.
+# Nothing else changes: comments inside function bodies keep their slashes. In the C header, likewise with /* text */.
 
 BEGIN { at_top = 1; follows = 0 }
+
+FNR == 1 { in_c = /^\/\*/ }
+in_c {
+  if (FNR == 1) sub(/^\/\*/, "/** @file\n *")
+  else if (/^#pragma once|^#ifndef HALFSHADE_[A-Z_]*_H$/) next
+  else if (/^ *\/\* / && !/^\/\* ----/) sub(/\/\* /, "/** ")
+  else if (/[;,] +\/\* /) sub(/\/\* /, "/**< ")
+  else if (/[0-9] +\/\* /) sub(/\/\* /, "/**< ")
+  print
+  next
+}
 
 FNR == 1 && /^\/\// {
   print (FILENAME ~ /\/halfshade\.h$/ ? "/// @mainpage The interface of halfshade" : "/// @file")

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "halfshade/export.h"
+
 namespace halfshade {
 
 /// What went wrong, as far as a program can act on it; the message has the rest.
@@ -17,7 +19,7 @@ enum class ErrorCode {
 };
 
 /// Thrown by everything in the library that can fail, besides std::bad_alloc.
-class Error : public std::runtime_error {
+class HALFSHADE_API Error : public std::runtime_error {
  public:
   /// `message` names the argument or file, its value and the allowed range.
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}

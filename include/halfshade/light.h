@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "halfshade/export.h"
 #include "halfshade/types.h"
 
 namespace halfshade {
@@ -55,7 +56,7 @@ inline constexpr double kSunDistance = 4096.0;
 /// surface lies within h / kSunDistance of where parallel light puts it. A box of size zero counts as one of half
 /// diagonal 1. Lights of other shapes are returned as they are. Throws Error{kBadInput} for a direction of length zero,
 /// an angle out of range or a box that is not finite.
-Light place_sun(const Light& light, const dvec3& low, const dvec3& high);
+HALFSHADE_API Light place_sun(const Light& light, const dvec3& low, const dvec3& high);
 
 /// Pinhole camera, right-handed: looks from `eye` towards `target`; image row 0 is the top.
 struct Camera {

@@ -36,13 +36,13 @@ struct RasterConfig {
 };
 
 /// Element `frame` of a low-discrepancy sequence of offsets in [-0.5, 0.5)^2; element 0 is (0, 0).
-dvec2 subpixel_jitter(std::uint32_t frame);
+HALFSHADE_API dvec2 subpixel_jitter(std::uint32_t frame);
 
 /// Draws the scene as seen from `camera` (world space) into `gbuffer`. Triangles are numbered through the scene:
 /// ShadowScene::triangle_of. Equal inputs give equal bits for any number of threads, any executor, any instruction set
 /// and any window. Throws Error{kUsage} for a scene that is not committed, a size or window out of range or a
 /// degenerate camera; Error{kCancelled}; std::bad_alloc; what `execution` throws.
-void rasterize(const ShadowScene& scene, const Camera& camera, const RasterConfig& config, GBuffer& gbuffer,
-               const Execution& execution = {});
+HALFSHADE_API void rasterize(const ShadowScene& scene, const Camera& camera, const RasterConfig& config,
+                             GBuffer& gbuffer, const Execution& execution = {});
 
 }  // namespace halfshade

@@ -63,7 +63,7 @@ struct MeshTriangle {
 /// Threads: const member functions may run concurrently with each other and with solves; others may not run
 /// concurrently with anything on the same scene. Errors are thrown before anything changes, std::bad_alloc as well; a
 /// commit() that throws leaves the scene uncommitted, with all noted changes, and may be called again.
-class ShadowScene {
+class HALFSHADE_API ShadowScene {
  public:
   /// An empty scene, to be committed like any other. Throws Error{kUsage} for a configuration out of range.
   explicit ShadowScene(const SceneConfig& config = {});
@@ -106,7 +106,7 @@ class ShadowScene {
 
   const SceneStats& stats() const;  // counters since the scene was made
 
-  struct Impl;
+  struct HALFSHADE_LOCAL Impl;
   const Impl& impl() const { return *impl_; }  // for the library's own use
 
  private:

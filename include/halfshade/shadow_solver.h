@@ -62,7 +62,7 @@ struct WorkspaceConfig {
 /// scene, number of receivers, and lights that differ only in place, shape parameters and colour, method `exact`
 /// allocates nothing (see ShadowSolver). Distinct Workspaces may be used concurrently; one Workspace may not: a call
 /// that finds it in use throws Error{kUsage}.
-class Workspace {
+class HALFSHADE_API Workspace {
  public:
   /// Allocates little; the first call does. Throws Error{kUsage} for a configuration out of range.
   explicit Workspace(const WorkspaceConfig& config = {});
@@ -76,7 +76,7 @@ class Workspace {
   /// Of the last call that returned or threw.
   const SolveStats& stats() const;
 
-  struct Impl;
+  struct HALFSHADE_LOCAL Impl;
   Impl& impl() { return *impl_; }  // for the library's own use
 
  private:
@@ -90,7 +90,7 @@ class Workspace {
 ///
 /// The floating-point environment of the calling thread, and of all threads that help, is saved, set to round to
 /// nearest with denormals, and restored.
-class ShadowSolver {
+class HALFSHADE_API ShadowSolver {
  public:
   /// Throws Error{kUsage} for a configuration out of range, and for method raytrace, which is not in the library.
   /// config.progress is called if the Execution of a call has none; config.back_face_casters counts for nothing (it is
