@@ -9,7 +9,7 @@ BEGIN { at_top = 1; follows = 0 }
 FNR == 1 { in_c = /^\/\*/ }
 in_c {
   if (FNR == 1) sub(/^\/\*/, "/** @file\n *")
-  else if (/^#pragma once|^#ifndef HALFSHADE_[A-Z_]*_H$/) next
+  else if (/^#define HALFSHADE_[A-Z_]*_H$/) next  # makes up for it
   else if (/^ *\/\* / && !/^\/\* ----/) sub(/\/\* /, "/** ")
   else if (/[;,] +\/\* /) sub(/\/\* /, "/**< ")
   else if (/[0-9] +\/\* /) sub(/\/\* /, "/**< ")
