@@ -14,6 +14,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -74,12 +75,17 @@ def run_page(page, text, command, environment, source):
         fixtures = pathlib.Path(__file__).resolve().parent / "files"
         shutil.copytree(fixtures, scratch, dirs_exist_ok=True)
         shutil.copytree(pathlib.Path(source) / "docs" / "views", pathlib.Path(scratch) / "docs" / "views")
-        result = subprocess.run(command, input=text, cwd=scratch, env=environment, text=True, timeout=SECONDS,
-                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
-    print(f"== {page}\n{result.stdout}", end="")
-    if result.returncode != 0:
-        print(f"{page}: exit code {result.returncode}; the blocks were\n{text}")
-    return result.returncode == 0
+        process = subprocess.Popen(command, cwd=scratch, env=environment, text=True, start_new_session=True,
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        try:
+            output, _ = process.communicate(text, timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)  # whatever the blocks started as well
+            output, _ = process.communicate()
+    print(f"== {page}\n{output}", end="")
+    if process.returncode != 0:
+        print(f"{page}: exit code {process.returncode}; the blocks were\n{text}")
+    return process.returncode == 0
 
 
 def run_shell(program, source, pages):
