@@ -1,11 +1,9 @@
 # Install rules: the libraries, public headers, and what find_package(halfshade) and pkg-config read. Components as in
 # HalfshadePackages.cmake. halfshade::io is not installed: it serves the command line and has no public headers.
-option(HALFSHADE_INSTALL "Install rules" ${PROJECT_IS_TOP_LEVEL})
 if(NOT HALFSHADE_INSTALL)
   return()
 endif()
 
-include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/halfshade)
 

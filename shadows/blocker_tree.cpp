@@ -14,15 +14,7 @@ constexpr std::size_t kParallelFrom = 8192;  // triangles; smaller subtrees are 
 /// Bounds are widened by this much (coordinates are below 4) against rounding of bounds and receivers to float.
 constexpr double kBoundPad = 2e-6;
 
-struct Bounds {
-  vec3 low{1e30f}, high{-1e30f};
-  void add(const vec3& p) { low = glm::min(low, p), high = glm::max(high, p); }
-  void add(const Bounds& b) { low = glm::min(low, b.low), high = glm::max(high, b.high); }
-  float area() const {
-    const vec3 e = high - low;
-    return e.x < 0.0f ? 0.0f : e.x * e.y + e.y * e.z + e.z * e.x;
-  }
-};
+using Bounds = BlockerTree::Bounds;
 
 struct Item {
   Bounds bounds;
@@ -56,6 +48,7 @@ Split find_split(std::span<const Item> items, const Bounds& centers) {
   Split best;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(centers.high[axis] > centers.low[axis])) continue;
+    check_run();
     std::array<Bounds, kBins> bounds;
     std::array<std::size_t, kBins> counts{};
     for (const Item& item : items) {
@@ -88,6 +81,7 @@ std::unique_ptr<Branch> build(std::span<Item> items, std::size_t begin) {
   branch->begin = begin, branch->end = begin + items.size();
   Bounds centers;
   for (const Item& item : items) branch->bounds.add(item.bounds), centers.add(item.center);
+  check_run();
   if (items.size() <= kWidth) return branch;
   const Split split = find_split(items, centers);
   auto middle = items.begin() + static_cast<std::ptrdiff_t>(items.size() / 2);  // all centres equal: halve the run
@@ -126,6 +120,7 @@ std::vector<const Branch*> widen(const Branch& branch) {
 std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   const auto index = static_cast<std::uint32_t>(tree.nodes.size());
   tree.nodes.emplace_back();
+  check_run();
   const std::vector<const Branch*> children = widen(branch);
   tree.nodes[index].count = static_cast<std::uint32_t>(children.size());
   for (std::uint32_t i = 0; i < children.size(); ++i) {
@@ -208,7 +203,9 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
                         BlockerTree& tree) {
   tree.blockers.resize(tree.order.size());
-  std::vector<Bounds> leaf_box(tree.leaves.size()), node_box(tree.nodes.size());
+  std::vector<Bounds>&leaf_box = tree.leaf_box, &node_box = tree.node_box;
+  leaf_box.resize(tree.leaves.size());
+  node_box.assign(tree.nodes.size(), {});
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
       fill_leaf(mesh, samples, tree, tree.leaves[i]);

@@ -43,6 +43,18 @@ struct BlockerTree {
   std::vector<Blocker> blockers;     // [place in order], for the light of the last refit
   std::vector<AlphaTriangle> alpha;  // of the perforated ones
 
+  /// Scratch of refit_blocker_tree, kept so that refitting again allocates nothing.
+  struct Bounds {
+    vec3 low{1e30f}, high{-1e30f};
+    void add(const vec3& p) { low = glm::min(low, p), high = glm::max(high, p); }
+    void add(const Bounds& b) { low = glm::min(low, b.low), high = glm::max(high, b.high); }
+    float area() const {
+      const vec3 e = high - low;
+      return e.x < 0.0f ? 0.0f : e.x * e.y + e.y * e.z + e.z * e.x;
+    }
+  };
+  std::vector<Bounds> leaf_box, node_box;
+
   std::size_t bytes() const;
 };
 

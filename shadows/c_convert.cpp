@@ -1,9 +1,10 @@
 #include "shadows/c_convert.h"
 
+#include <algorithm>
 #include <sstream>
 
-#include "shadows/method_options.h"
-#include "shadows/solver.h"
+#include "halfshade/names.h"
+#include "shadows/view_access.h"
 
 namespace halfshade {
 
@@ -44,7 +45,7 @@ void read_emission_image(const halfshade_light& given, const std::string& name, 
   if (given.image_width == 0 || given.image_height == 0) usage(name + ".emission_image has no width or no height");
   const std::uint64_t texels = std::uint64_t{given.image_width} * given.image_height;
   if (texels > kMostInC) throw Error(ErrorCode::kLimit, name + ".emission_image has more than 2^31 - 1 texels");
-  check_array(given.emission_image, texels, 0, sizeof(vec3), alignof(float), name + ".emission_image");
+  check_array(given.emission_image, texels, 0, sizeof(vec3), 1, name + ".emission_image");
   image.width = given.image_width;
   image.height = given.image_height;
   image.rgb.resize(texels);
@@ -54,18 +55,7 @@ void read_emission_image(const halfshade_light& given, const std::string& name, 
 void read_points(const halfshade_points& points, const std::string& name, std::vector<dvec3>& values) {
   const PointView view = to_view(points, name);
   values.resize(view.count);
-  const std::size_t stride =
-      view.stride_bytes != 0 ? view.stride_bytes : 3 * (view.is_double ? sizeof(double) : sizeof(float));
-  for (std::size_t i = 0; i < view.count; ++i) {
-    const unsigned char* element = static_cast<const unsigned char*>(view.data) + i * stride;
-    if (view.is_double) {
-      std::memcpy(&values[i], element, sizeof(dvec3));
-    } else {
-      vec3 value;
-      std::memcpy(&value, element, sizeof value);
-      values[i] = dvec3(value);
-    }
-  }
+  for (std::size_t i = 0; i < view.count; ++i) values[i] = element(view, i);
 }
 
 }  // namespace
@@ -78,11 +68,11 @@ void check_struct_size(std::size_t struct_size, std::size_t known, const char* n
 
 void check_array(const void* data, std::size_t count, std::size_t stride_bytes, std::size_t element_bytes,
                  std::size_t alignment, const std::string& name) {
-  if (count > kMostInC)
-    throw Error(ErrorCode::kLimit, name + " has " + std::to_string(count) + " elements, allowed are 2^31 - 1");
-  if (stride_bytes > kMostInC)
-    throw Error(ErrorCode::kLimit,
-                name + ": stride of " + std::to_string(stride_bytes) + " bytes, allowed are 2^31 - 1");
+  const auto limit = [&name](const std::string& what) {
+    throw Error(ErrorCode::kLimit, name + what + ", allowed are 2^31 - 1");
+  };
+  if (count > kMostInC) limit(" has " + std::to_string(count) + " elements");
+  if (stride_bytes > kMostInC) limit(": stride of " + std::to_string(stride_bytes) + " bytes");
   if (count == 0) return;
   if (data == nullptr) usage(name + " has " + std::to_string(count) + " elements, but its data is NULL");
   if (stride_bytes != 0 && stride_bytes < element_bytes) {
@@ -106,29 +96,28 @@ PointView to_view(const halfshade_points& points, const std::string& name) {
 }
 
 IndexView to_view(const halfshade_indices& indices, const std::string& name) {
-  check_array(indices.data, indices.count, indices.stride_bytes, sizeof(std::uint32_t), alignof(std::uint32_t), name);
+  check_array(indices.data, indices.count, indices.stride_bytes, sizeof(std::uint32_t), 1, name);
   return {indices.data, indices.count, indices.stride_bytes};
 }
 
 TriangleView to_triangles(const halfshade_indices& triangles, const std::string& name) {
-  check_array(triangles.data, triangles.count, triangles.stride_bytes, 3 * sizeof(std::uint32_t),
-              alignof(std::uint32_t), name);
+  check_array(triangles.data, triangles.count, triangles.stride_bytes, 3 * sizeof(std::uint32_t), 1, name);
   return {triangles.data, triangles.count, triangles.stride_bytes};
 }
 
 UvView to_view(const halfshade_uvs& uvs, const std::string& name) {
-  check_array(uvs.data, uvs.count, uvs.stride_bytes, 2 * sizeof(float), alignof(float), name);
+  check_array(uvs.data, uvs.count, uvs.stride_bytes, 2 * sizeof(float), 1, name);
   return {uvs.data, uvs.count, uvs.stride_bytes};
 }
 
 AlphaView to_view(const halfshade_alpha_desc* given) {
   const halfshade_alpha_desc desc = read_struct(given, "alpha map");
   if (desc.data == nullptr) usage("alpha map: data is NULL");
-  const std::size_t texel_bytes = desc.texel_bytes != 0 ? desc.texel_bytes : 1;
-  const std::size_t width_bytes = (desc.width > 0 ? desc.width - 1 : 0) * std::uint64_t{1} * texel_bytes + 1;
-  if (texel_bytes > kMostInC || desc.row_bytes > kMostInC) {
+  if (desc.texel_bytes > kMostInC || desc.row_bytes > kMostInC) {
     throw Error(ErrorCode::kLimit, "alpha map: texels or rows are more than 2^31 - 1 bytes apart");
   }
+  const std::size_t texel_bytes = desc.texel_bytes != 0 ? desc.texel_bytes : 1;
+  const std::uint64_t width_bytes = std::uint64_t{std::max(desc.width, 1u) - 1} * texel_bytes + 1;
   if (desc.row_bytes != 0 && desc.row_bytes < width_bytes) {
     usage("alpha map: rows are " + std::to_string(desc.row_bytes) + " bytes apart, but one has " +
           std::to_string(width_bytes));

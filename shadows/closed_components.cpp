@@ -17,6 +17,7 @@ std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<st
   std::vector<EdgeUse> uses;
   uses.reserve(mesh.triangles.size() * 3);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (t % 65536 == 0) check_run();
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t a = number[mesh.triangles[t][k]], b = number[mesh.triangles[t][(k + 1) % 3]];
       if (a == b) continue;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "rasterizer/core/mesh.h"
+#include "rasterizer/core/run.h"
 #include "shadows/receivers.h"
 #include "shadows/visibility_kernel.h"
 
@@ -32,7 +33,8 @@ struct EdgeUse {
 /// Calls run(uses of one edge) for each edge; `uses` are sorted by edge.
 template <class Run>
 void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
-  while (!uses.empty()) {
+  for (std::size_t runs = 0; !uses.empty(); ++runs) {
+    if (runs % 65536 == 0) check_run();
     std::size_t count = 1;
     while (count < uses.size() && uses[count].edge == uses[0].edge) ++count;
     run(uses.first(count));

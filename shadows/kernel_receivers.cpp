@@ -9,6 +9,12 @@ namespace halfshade {
 KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order,
                                  std::size_t words) {
   KernelReceivers k;
+  gather_receivers(receivers, order, words, k);
+  return k;
+}
+
+void gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order, std::size_t words,
+                      KernelReceivers& k) {
   k.count = order.size();
   k.words = words;
   const std::size_t padded = order.size() + KernelReceivers::kLanePadding;
@@ -24,7 +30,6 @@ KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vect
       k.set[i] = receivers.set[order[i]];
     }
   });
-  return k;
 }
 
 void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const std::vector<std::uint32_t>& order,

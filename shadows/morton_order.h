@@ -14,11 +14,19 @@ inline std::uint32_t spread_bits(std::uint32_t x) {
   return (x | x << 2) & 0x09249249u;
 }
 
+/// Kept from call to call so that ordering again allocates nothing.
+struct MortonScratch {
+  using Key = std::pair<std::uint32_t, std::uint32_t>;  // code, index
+  std::vector<Key> keys, scratch;
+};
+
 /// Indices of the points for which keep(index) holds, by their place among 1024^3 cells of the box around all points;
 /// within a cell by index.
 template <class Keep>
-std::vector<std::uint32_t> morton_order(std::span<const vec3> points, const Keep& keep) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> keys;
+void morton_order(std::span<const vec3> points, const Keep& keep, MortonScratch& scratch,
+                  std::vector<std::uint32_t>& order) {
+  auto& keys = scratch.keys;
+  keys.clear();
   keys.reserve(points.size());
   vec3 low(2.0f), high(-2.0f);
   for (const vec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
@@ -31,10 +39,17 @@ std::vector<std::uint32_t> morton_order(std::span<const vec3> points, const Keep
                                spread_bits(static_cast<std::uint32_t>(q.z)) << 2;
     keys.emplace_back(code, i);
   }
-  parallel_sort(keys, [](const auto& a, const auto& b) { return a < b; });
-  std::vector<std::uint32_t> order;
-  order.reserve(keys.size());
+  parallel_sort(keys, scratch.scratch, [](const auto& a, const auto& b) { return a < b; });
+  order.clear();
+  order.reserve(points.size());
   for (const auto& key : keys) order.push_back(key.second);
+}
+
+template <class Keep>
+std::vector<std::uint32_t> morton_order(std::span<const vec3> points, const Keep& keep) {
+  MortonScratch scratch;
+  std::vector<std::uint32_t> order;
+  morton_order(points, keep, scratch, order);
   return order;
 }
 

@@ -169,15 +169,14 @@ void update_tree(SceneImpl& scene) {
   Stopwatch watch;
   bool build = !scene.tree_is_current;
   if (!build && scene.config.rebuild_cost > 0.0) {
-    scene.stats.tree_cost =
-        scene.built_cost > 0.0 ? tree_cost(scene.mesh, scene.tree, scene.tree_boxes) / scene.built_cost : 1.0;
+    scene.stats.tree_cost = scene.built_cost > 0.0 ? tree_cost(scene.mesh, scene.tree) / scene.built_cost : 1.0;
     build = scene.stats.tree_cost > scene.config.rebuild_cost;
   }
   if (build) {
     scene.tree_is_current = false;
     build_blocker_tree(scene.mesh, scene.tree);
     ++scene.tree_version;
-    scene.built_cost = scene.config.rebuild_cost > 0.0 ? tree_cost(scene.mesh, scene.tree, scene.tree_boxes) : 0.0;
+    scene.built_cost = scene.config.rebuild_cost > 0.0 ? tree_cost(scene.mesh, scene.tree) : 0.0;
     scene.tree_is_current = true;
     scene.stats.tree_cost = 1.0;
     ++scene.stats.tree_builds;
@@ -214,9 +213,13 @@ void commit_scene(SceneImpl& scene) {
   Stopwatch watch;
   if (!scene.laid_out) lay_out(scene);
   choose_frame(scene);
-  for (StoredMesh& mesh : scene.meshes) {
-    if (!mesh.rounded) update_mesh(mesh, scene);
+  Run& run = *current_run();
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    if (scene.meshes[i].rounded) continue;
+    run.report(0.5 * static_cast<double>(i) / static_cast<double>(scene.meshes.size()));
+    update_mesh(scene.meshes[i], scene);
   }
+  run.report(0.5);
   update_parts(scene);
   update_tree(scene);
   ++scene.version;

@@ -53,8 +53,6 @@ struct ShadowScene::Impl {
   BlockerTree tree;  // order and topology; boxes belong to lights, and so to workspaces
   double built_cost = 0.0;
 
-  TreeBoxes tree_boxes;
-
   /// Nobody else has this pointer's address as long as anybody keeps it: tells scenes apart.
   std::shared_ptr<const int> identity = std::make_shared<const int>(0);
   std::uint64_t version = 0;       // of what blocks

@@ -1,6 +1,7 @@
 // Chooses the method and runs it on receivers that exist already.
 #pragma once
 
+#include "halfshade/names.h"
 #include "halfshade/shadows.h"
 #include "shadows/receivers.h"
 
@@ -27,13 +28,8 @@ std::string method_assumptions(const ShadowConfig& config, const Light& light);
 /// Of all receivers.
 void visibility_of(const VisibilityMasks& masks, std::vector<float>& visibility);
 
-/// Calls config.progress if there is one; throws Error{kCancelled} when it returns false.
+/// Asks whoever watches the current call, or config.progress outside of any; throws Error{kCancelled} when told to
+/// stop.
 void report_progress(const ShadowConfig& config, double done);
-
-/// "exact", "afsm" ...; throws Error{kUsage} listing the known names.
-ShadowMethod shadow_method_from_name(const std::string& name);
-const char* name_of(ShadowMethod method);
-SamplePattern sample_pattern_from_name(const std::string& name);
-const char* name_of(SamplePattern pattern);
 
 }  // namespace halfshade

@@ -17,6 +17,7 @@
 #include "halfshade/error.h"
 #include "halfshade/execution.h"
 #include "halfshade/light.h"
+#include "halfshade/names.h"
 #include "halfshade/rasterizer.h"
 #include "halfshade/scene.h"
 #include "halfshade/shadow_scene.h"
