@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 constexpr std::size_t kMostSamples = 4096;
 constexpr std::size_t kMostCorners = 64;  // of a polygon; that it is flat and convex is checked where it is used
 constexpr std::uint64_t kMostFileBytes = std::uint64_t{16} << 20;
-constexpr const char* kShapeNames[] = {"point",   "rectangle", "disk",   "sphere",
+constexpr const char* kShapeNames[] = {"point",   "rectangle", "disk",    "sphere",
                                        "samples", "ellipsoid", "polygon", "sun"};  // by LightShape
 
 /// A value of the file together with where it is, for messages.

@@ -115,7 +115,8 @@ TEST_CASE("suns without a place, a direction or a sensible size are refused, oth
   for (const auto& [light, what] : bad) {
     CHECK_THROWS_WITH_AS(place_sun(light, dvec3(0), dvec3(1)), doctest::Contains(what), Error);
   }
-  CHECK_THROWS_WITH_AS(place_sun(sun({0, -1, 0}), dvec3(0), dvec3(std::numeric_limits<double>::infinity())), doctest::Contains("box"), Error);
+  CHECK_THROWS_WITH_AS(place_sun(sun({0, -1, 0}), dvec3(0), dvec3(std::numeric_limits<double>::infinity())),
+                       doctest::Contains("box"), Error);
   CHECK(place_sun(sun({0, -1e300, 0}), dvec3(2), dvec3(2)).center == dvec3(2, 2 + kSunDistance, 2));
   CHECK(place_sun(frame_light(), dvec3(0), dvec3(1)).shape == LightShape::kRectangle);
   CHECK(place_sun(frame_light(), dvec3(0), dvec3(1)).center == frame_light().center);
