@@ -12,7 +12,7 @@
 namespace halfshade {
 namespace {
 
-constexpr std::size_t kCluster = 64;  // receivers that share a list of leaves
+constexpr std::size_t kCluster = 128;  // receivers that share a list of leaves
 constexpr std::size_t kClustersPerTask = 8;
 
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
@@ -95,7 +95,9 @@ void even_out(std::vector<ExactScratch>& scratches) {
   }
 }
 
-void clear_counters(ExactScratch& scratch) {
+/// Nothing is left of the light of an earlier call but memory.
+void start_anew(ExactScratch& scratch) {
+  scratch.lines.placed = PictureLines::kNothing;
   scratch.counters = {};
   scratch.leaves_listed = scratch.leaves_tested = scratch.clusters_lit = 0;
 }
@@ -134,20 +136,27 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const std::vector<std::uint32_t>& order = work.order;
   if (order.empty()) return;
   KernelReceivers& kernel = work.receivers;
-  gather_receivers(receivers, order, masks.words_per_receiver, kernel);
-  stats.index_ms += watch.lap();
   const KernelSamples& samples = kept.samples;
   const SampleRows& rows = kept.rows;
+  if (rows.empty()) {
+    gather_receivers(receivers, order, masks.words_per_receiver, kernel);
+  } else {  // bits are in the order of the samples: no masks but the caller's
+    gather_receivers(receivers, order, 0, kernel);
+    kernel.words = masks.words_per_receiver;
+    kernel.mask_at.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
+  }
+  stats.index_ms += watch.lap();
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
   const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
-  const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
+  const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   std::vector<ExactScratch>& scratches = work.scratches;
   scratches.resize(kTasksPerRound);
   even_out(scratches);
-  for (ExactScratch& scratch : scratches) clear_counters(scratch);
+  for (ExactScratch& scratch : scratches) start_anew(scratch);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
@@ -158,7 +167,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
       }
     });
   }
-  scatter_masks(kernel, samples, order, masks);
+  if (rows.empty()) scatter_masks(kernel, samples, order, masks);
   add_counters(scratches, stats);
   stats.bytes =
       std::max<std::uint64_t>(stats.bytes, side.tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
@@ -192,7 +201,7 @@ void ExactWork::reserve(std::size_t count, std::size_t words) {
   morton.keys.reserve(count), morton.scratch.reserve(count), order.reserve(count);
   receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
   receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
-  receivers.masks.reserve(count * words);
+  receivers.masks.reserve(count * words), receivers.mask_at.reserve(count);
 }
 
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {

@@ -16,8 +16,8 @@ namespace halfshade {
 struct ExactBlockers {
   const LatticeMesh& mesh;
   const ClosedComponents* closed = nullptr;  // null: both sides of all triangles cast
-  const BlockerTree* tree = nullptr;         // order and topology; null: ExactSide::tree has them
-  std::uint64_t tree_version = 1;            // changes with the order; not 0
+  const BlockerTree* tree = nullptr;         // as built or placed; null: ExactSide::tree is
+  std::uint64_t tree_version = 1;            // changes with the tree; not 0
 };
 
 /// One side of a light and the blockers as it sees them.
@@ -25,7 +25,7 @@ struct ExactSide {
   BlockerTree tree;
   bool fitted = false;               // the tree belongs to the light's samples and to the blockers
   std::vector<std::uint8_t> usable;  // the certificates that the tree was fitted with
-  std::uint64_t tree_version = 0;    // whose order the tree has; 0 = none
+  std::uint64_t tree_version = 0;    // which tree it is a copy of; 0 = none
 };
 
 /// What the engine makes of a light, to be kept from call to call.

@@ -22,6 +22,7 @@ void gather_receivers(const ReceiverArray& receivers, const std::vector<std::uin
   k.own.assign(padded, kNone), k.open.assign(padded, ~0u);
   k.set.assign(padded, 0);
   k.masks.assign(order.size() * words, 0);
+  k.mask_at.clear();
   parallel_ranges(order.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
       const vec3& p = receivers.position[order[i]];

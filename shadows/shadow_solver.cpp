@@ -89,6 +89,9 @@ bool is_kept(const Call& call, std::size_t index) {
 }
 
 void check_lights(const Call& call) {
+  if (call.frame >= kMaxFrames) {
+    usage("frame: " + std::to_string(call.frame) + " is not below " + std::to_string(kMaxFrames));
+  }
   for (std::size_t i = 0; i < call.lights.size(); ++i) {
     const Light& light = call.lights[i];
     if (!is_kept(call, i)) check_light(light, call.config);
@@ -125,6 +128,7 @@ KeptLight& keep_light(const Call& call, std::size_t index) {
 std::span<const vec3> emission_weights(const Light& light, KeptLight& kept) {
   if (light.emission_image.empty()) return {};
   if (kept.weights.empty() || !same_image(light.emission_image, kept.image)) {
+    kept.image.rgb.clear();  // belongs to no weights until both are there
     kept.weights = sample_emission(light.emission_image, kept.samples);
     kept.image = light.emission_image;
   }
@@ -180,7 +184,7 @@ void solve_lit(const Call& call, const Light& light, KeptLight& kept) {
   add_stats(stats, w.stats);
 }
 
-/// One receiver's results; `at` numbers the light's receivers in the spans.
+/// One receiver's results under one light.
 struct ReceiverResult {
   std::span<const std::uint64_t> mask;  // empty: blocked in every sample, or no masks
   float visibility = 0.0f;

@@ -28,29 +28,36 @@ constexpr unsigned kModes[] = {
     0x1f80u | 0x8040u | 0x2000u  // both kinds, downward
 };
 
+/// What the calls below are given; made in the default environment.
+struct Input {
+  std::vector<OwnedMesh> meshes = embed_meshes(10);
+  Transform transform = turned(0.37, {0.31, 1.1, 0.17});
+  Ground ground{24};
+  Light light = frame_light();
+  Scene scene = scene_of(box({-0.5, 1, -0.5}, {0.5, 2, 0.5}));
+  Camera camera{.eye = {0, 3, 6}, .target = {0, 0.5, 0}};
+};
+
 /// Everything an embedding program calls, from the very first mesh on.
 struct Everything {
   Solved solved;
   std::vector<std::uint32_t> triangles;
   std::string hash;
 
-  explicit Everything(const Execution& execution) {
-    EmbedScene s(10);
-    s.scene.set_transform(s.ids[1], turned(0.37, {0.31, 1.1, 0.17}));
+  Everything(const Input& input, const Execution& execution) {
+    EmbedScene s(input.meshes, execution);
+    s.scene.set_transform(s.ids[1], input.transform);
     s.scene.commit(execution);
-    const Ground ground(24);
-    const Light light = frame_light();
     const ShadowSolver solver({.light_sample_count = 64, .sample_sets = 2});
     Workspace workspace;
-    solved = solve(solver, s.scene, ground.view(), {&light, 1}, workspace, execution);
+    solved = solve(solver, s.scene, input.ground.view(), {&input.light, 1}, workspace, execution);
     GBuffer gbuffer;
     RasterConfig raster;
     raster.width = raster.height = 50;
-    rasterize(s.scene, {.eye = {0, 3, 6}, .target = {0, 0.5, 0}}, raster, gbuffer, execution);
+    rasterize(s.scene, input.camera, raster, gbuffer, execution);
     triangles = gbuffer.triangle;
     VisibilityMasks masks;
-    solve_shadows(scene_of(box({-0.5, 1, -0.5}, {0.5, 2, 0.5})), receivers_at(ground.positions), light,
-                  {.light_sample_count = 64}, masks);
+    solve_shadows(input.scene, receivers_at(input.ground.positions), input.light, {.light_sample_count = 64}, masks);
     hash = masks.hash();
   }
   bool operator==(const Everything& o) const {
@@ -61,30 +68,36 @@ struct Everything {
 
 }  // namespace
 
+namespace {
+
+/// A host whose threads run in `mode`; counts the bodies that changed it.
+Execution host_in_mode(unsigned mode, std::atomic<int>& changed) {
+  Execution host = host_execution();
+  host.parallel_for = [mode, &changed](std::size_t count, TaskBody body) {
+    const auto in_mode = [&](std::size_t i) {
+      _mm_setcsr(mode);
+      body(i);
+      changed += (_mm_getcsr() & ~0x3fu) != mode;
+    };
+    const auto call = [](const void* context, std::size_t i) { (*static_cast<const decltype(in_mode)*>(context))(i); };
+    run_on_threads(3, count, TaskBody(call, &in_mode));
+  };
+  return host;
+}
+
+}  // namespace
+
 TEST_CASE("S30: flush-to-zero and directed rounding around a call change no bit and are there again after it") {
-  const Everything expected{Execution{}};
+  const Input input;
+  const Everything expected(input, {});
   REQUIRE(blocked_bits(expected.solved.masks) > 1000);
   const unsigned before = _mm_getcsr();
   for (const unsigned mode : kModes) {
     CAPTURE(mode);
-    Execution serial{Executor::kSerial};
-    Execution host = host_execution();
     std::atomic<int> changed{0};
-    host.parallel_for = [&](std::size_t count, const TaskBody& body) {
-      run_on_threads(3, count,
-                     TaskBody(
-                         [](const void* context, std::size_t i) {
-                           const auto& [inner, wrong, csr] =
-                               *static_cast<const std::tuple<TaskBody, std::atomic<int>*, unsigned>*>(context);
-                           _mm_setcsr(csr);
-                           inner(i);
-                           if ((_mm_getcsr() & ~0x3fu) != (csr & ~0x3fu)) ++*wrong;
-                         },
-                         std::array{std::tuple<TaskBody, std::atomic<int>*, unsigned>{body, &changed, mode}}.data()));
-    };
-    for (const Execution& execution : {Execution{}, serial, host}) {
+    for (const Execution& execution : {Execution{}, Execution{Executor::kSerial}, host_in_mode(mode, changed)}) {
       _mm_setcsr(mode);
-      const Everything now(execution);
+      const Everything now(input, execution);
       const unsigned after = _mm_getcsr();
       _mm_setcsr(before);
       CHECK((now == expected));

@@ -110,23 +110,29 @@ inline std::uint64_t blocked_bits(std::span<const std::uint64_t> masks) {
   return count;
 }
 
-/// A ground, some balls and a box above it.
+/// A ground, two balls and a box above it.
+inline std::vector<OwnedMesh> embed_meshes(std::uint32_t rings) {
+  std::vector<OwnedMesh> meshes;
+  meshes.push_back(mesh_of(quad({-3, 0, -3}, {-3, 0, 3}, {3, 0, 3}, {3, 0, -3})));
+  meshes.push_back(ball({0, 0, 0}, 0.5, rings));
+  meshes.back().transform = moved_by({0.7, 1.0, 0.2});
+  meshes.push_back(ball({0, 0, 0}, 0.4, rings));
+  meshes.back().transform = turned(0.3, {-0.9, 0.6, -0.5});
+  meshes.push_back(mesh_of(box({-0.3, -0.3, -0.3}, {0.3, 0.3, 0.3})));
+  meshes.back().transform = turned(0.7, {-0.2, 1.6, 0.9});
+  return meshes;
+}
+
 struct EmbedScene {
   std::vector<OwnedMesh> meshes;
   std::vector<std::uint32_t> ids;
   ShadowScene scene;
 
-  explicit EmbedScene(std::uint32_t rings = 12) {
-    meshes.push_back(mesh_of(quad({-3, 0, -3}, {-3, 0, 3}, {3, 0, 3}, {3, 0, -3})));
-    meshes.push_back(ball({0, 0, 0}, 0.5, rings));
-    meshes.back().transform = moved_by({0.7, 1.0, 0.2});
-    meshes.push_back(ball({0, 0, 0}, 0.4, rings));
-    meshes.back().transform = turned(0.3, {-0.9, 0.6, -0.5});
-    meshes.push_back(mesh_of(box({-0.3, -0.3, -0.3}, {0.3, 0.3, 0.3})));
-    meshes.back().transform = turned(0.7, {-0.2, 1.6, 0.9});
+  explicit EmbedScene(std::uint32_t rings = 12) : EmbedScene(embed_meshes(rings)) {}
+  explicit EmbedScene(std::vector<OwnedMesh> of, const Execution& execution = {}) : meshes(std::move(of)) {
     scene.extend(frame_light());
     for (const OwnedMesh& mesh : meshes) ids.push_back(scene.add_mesh(mesh.view()));
-    scene.commit();
+    scene.commit(execution);
   }
 };
 
