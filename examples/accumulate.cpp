@@ -1,5 +1,6 @@
 // Temporal jitter through the library alone: the same shadow asked for frame by frame with other light samples, counted
-// in integers. Prints the error of the average, and the power of the number of frames by which it falls.
+// in integers. The scene is committed once, and one workspace serves all frames. Prints the error of the average, and
+// the power of the number of frames by which it falls.
 #include <cstdio>
 #include <numeric>
 
@@ -9,33 +10,46 @@ int main() {
   using namespace halfshade;
 
   // A plate of two triangles at height 2 under a disk light at height 5.
-  Scene scene;
-  scene.positions = {{-1, 2, -1}, {1, 2, -1}, {1.2, 2, 1}, {-1, 2, 1}};
-  scene.triangles = {{0, 1, 2}, {0, 2, 3}};
-  scene.triangle_materials = {0, 0};
-  scene.materials.resize(1);
+  const std::vector<vec3> corners = {{-1, 2, -1}, {1, 2, -1}, {1.2f, 2, 1}, {-1, 2, 1}};
+  const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 1, 2}, {0, 2, 3}};
   Light light;
   light.shape = LightShape::kDisk;
   light.center = {0, 5, 0};
-  light.normal = {0, -1, 0};
   light.radius = 1.0;
 
   // Receivers on the floor.
-  std::vector<Receiver> receivers;
-  for (int i = 0; i < 64 * 64; ++i) receivers.push_back({dvec3(i % 64 * 0.15 - 4.7, 0, i / 64 * 0.15 - 4.7), kNone});
-  std::vector<std::uint32_t> all(receivers.size());
+  std::vector<dvec3> floor;
+  for (int i = 0; i < 64 * 64; ++i) floor.push_back({i % 64 * 0.15 - 4.7, 0, i / 64 * 0.15 - 4.7});
+  std::vector<std::uint32_t> all(floor.size());
   std::iota(all.begin(), all.end(), 0u);
 
+  ShadowScene scene;
+  MeshView plate;
+  plate.positions = corners;
+  plate.triangles = triangles;
+  scene.add_mesh(plate);
+  scene.extend(light);
+  scene.extend(floor);
+  scene.commit();
+
+  Workspace workspace;
   VisibilityMasks masks;
   const auto add_frame = [&](std::uint32_t samples, std::uint32_t frame, VisibilityAccumulator& sum) {
-    solve_shadows(scene, receivers, light, {.light_sample_count = samples, .frame = frame}, masks);
+    const ShadowSolver solver({.light_sample_count = samples});
+    ReceiverView receivers;
+    receivers.positions = floor;
+    receivers.frame = frame;
+    masks.reset(floor.size(), samples);
+    ShadowOutput output;
+    output.masks = masks.words;
+    solver.solve(scene, receivers, light, workspace, output);
     sum.add(masks);
   };
 
-  VisibilityAccumulator truth(receivers.size());
+  VisibilityAccumulator truth(floor.size());
   for (std::uint32_t frame = 0; frame < 16; ++frame) add_frame(1024, 1000 + frame, truth);
 
-  VisibilityAccumulator mean(receivers.size());
+  VisibilityAccumulator mean(floor.size());
   std::vector<double> frames, errors;
   for (std::uint32_t frame = 0; frame < 32; ++frame) {
     add_frame(64, frame, mean);

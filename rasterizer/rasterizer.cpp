@@ -45,6 +45,17 @@ PixelWindow checked_window(const RasterConfig& config) {
   return window;
 }
 
+/// Power of two, at least every |coordinate|.
+double reach_of(const LatticeMesh& mesh) {
+  float largest = 0.0f;
+  for (const vec3& p : mesh.positions) {
+    largest = std::max({largest, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+  }
+  double reach = kLatticeUnit;
+  while (reach < largest) reach *= 2.0;
+  return reach;
+}
+
 void resize(GBuffer& gbuffer, const RasterConfig& config, const PixelWindow& window) {
   const std::size_t count = std::size_t{window.width()} * window.height();
   gbuffer.triangle.resize(count);
@@ -188,6 +199,7 @@ void rasterize(const LatticeMesh& mesh, const Camera& camera, const RasterConfig
   counted.triangles_binned = pass.counts.survived;
   counted.tile_entries = pass.bins.entries.size();
   resize(gbuffer, config, window);
+  gbuffer.reach = reach_of(mesh);
   draw_tiles(mesh, frame, pass, gbuffer, counted);
   if (stats != nullptr) *stats = counted;
 }
@@ -196,6 +208,7 @@ PiecewisePicture begin_picture(const RasterConfig& config) {
   PiecewisePicture picture;
   GBuffer& gbuffer = picture.gbuffer;
   resize(gbuffer, config, checked_window(config));
+  gbuffer.reach = kLatticeUnit;
   std::fill(gbuffer.triangle.begin(), gbuffer.triangle.end(), kNone);
   picture.inverse_w.assign(gbuffer.size(), 0.0);
   return picture;
@@ -206,6 +219,7 @@ void rasterize_piece(const LatticeMesh& piece, std::uint32_t first_triangle, con
   const FpEnvironment environment;
   const CameraFrame frame = picture_frame(camera, piece.frame, config);
   const ScreenPass pass = make_screen_pass(piece, frame, picture.gbuffer.window);
+  picture.gbuffer.reach = std::max(picture.gbuffer.reach, reach_of(piece));
   std::vector<std::uint64_t> covered(pass.grid.size(), 0);
   parallel_tasks(pass.grid.size(), [&](std::size_t tile) {
     TileCoverage coverage(pass, tile);

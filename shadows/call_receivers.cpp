@@ -136,7 +136,7 @@ void read_receivers(const ShadowScene::Impl& scene, const GBuffer& gbuffer, Call
       const std::uint32_t x = gbuffer.window.x0 + static_cast<std::uint32_t>(i % gbuffer.window.width());
       const std::uint32_t y = gbuffer.window.y0 + static_cast<std::uint32_t>(i / gbuffer.window.width());
       receivers.normal[i] = gbuffer.geometric_normal[i];
-      receivers.position[i] = lifted_receiver(gbuffer.position[i], gbuffer.geometric_normal[i]);
+      receivers.position[i] = lifted_receiver(gbuffer.position[i], gbuffer.geometric_normal[i], gbuffer.reach);
       receivers.own[i] = gbuffer.triangle[i];
       receivers.number[i] = y * gbuffer.width + x;
       receivers.quad[i] = static_cast<std::uint8_t>(interleaved_set(x, y));

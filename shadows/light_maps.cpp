@@ -239,7 +239,8 @@ double equivalent_radius(const Light& light) {
 }
 
 std::string assumptions_of_equivalent_light(const Light& light) {
-  static constexpr const char* kNames[] = {"point", "rectangle", "disk", "sphere", "samples", "ellipsoid", "polygon"};
+  static constexpr const char* kNames[] = {"point",   "rectangle", "disk",    "sphere",
+                                           "samples", "ellipsoid", "polygon", "sun"};
   const std::string radius = short_number(equivalent_radius(light));
   if (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere) {
     return "a sphere of the light's radius " + radius;

@@ -52,6 +52,10 @@ void check_numbers(const ShadowConfig& config) {
 }
 
 void check_shape(const Light& light) {
+  if (light.shape == LightShape::kSun) {
+    throw Error(ErrorCode::kUsage,
+                "light '" + light.name + "': a sun has no place of its own; place_sun() gives it one");
+  }
   require(is_finite(light.center) && is_finite(light.u) && is_finite(light.v) && is_finite(light.normal) &&
               std::isfinite(light.radius),
           light, "a coordinate is not finite");

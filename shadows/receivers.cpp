@@ -21,7 +21,7 @@ ReceiverArray receivers_of_range(const GBuffer& gbuffer, const LightSamples& sam
     if (gbuffer.triangle[i] == kNone) continue;
     const auto entry = static_cast<std::uint32_t>(i);
     const vec3 normal = gbuffer.geometric_normal[i];
-    const vec3 position = lifted_receiver(gbuffer.position[i], normal);
+    const vec3 position = lifted_receiver(gbuffer.position[i], normal, gbuffer.reach);
     const std::uint32_t set = set_of_entry(gbuffer, samples, seed, entry);
     if (faces_away(position, normal, samples, set)) continue;
     part.push_back(position, normal, gbuffer.triangle[i], entry, static_cast<std::uint8_t>(set));

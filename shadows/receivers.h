@@ -1,6 +1,8 @@
 // The points that ask for light, made once and shared by every method, the oracle and the rivals.
 #pragma once
 
+#include <algorithm>
+
 #include "halfshade/shadow_solver.h"
 #include "rasterizer/core/mesh.h"
 #include "rasterizer/gbuffer.h"
@@ -23,12 +25,13 @@ struct ReceiverArray {
 };
 
 /// Distance by which a receiver is lifted off its triangle along the geometric normal: 4 ulp of a coordinate of size 1,
-/// 2^-21 of the scene (stability.md b8).
-inline constexpr double kReceiverOffset = kReceiverLift;
+/// 2^-21 of the frame (stability.md b8), but no more than 2^-18 of the scene where far lights make the scene small in
+/// its frame.
+inline constexpr double kReceiverOffset = kReceiverLift, kReceiverOffsetOfScene = 0x1p-18;
 
-/// Lifted and snapped.
-inline vec3 lifted_receiver(const dvec3& position, const vec3& normal) {
-  return snap_to_lattice(position + dvec3(normal) * kReceiverOffset);
+/// Lifted and snapped; `reach` is GBuffer::reach.
+inline vec3 lifted_receiver(const dvec3& position, const vec3& normal, double reach) {
+  return snap_to_lattice(position + dvec3(normal) * std::min(kReceiverOffset, kReceiverOffsetOfScene * reach));
 }
 
 /// Does the receiver lie at or behind a one-sided light?

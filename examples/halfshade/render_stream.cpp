@@ -100,6 +100,7 @@ void scan(const StreamRenderOptions& o, StreamRender& render) {
     view = fitted_view(render.scan.low, render.scan.high);
     fmt::print(stderr, "halfshade: no view file: camera and light were fitted to the scene\n");
   }
+  place_suns(view, render.scan.low, render.scan.high);
   if (render.scan.translucent > 0) {
     fmt::print(stderr, "halfshade: {} translucent triangles: with --stream they neither block nor tint light\n",
                render.scan.translucent);

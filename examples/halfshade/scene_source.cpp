@@ -45,9 +45,14 @@ SceneSource load_builtin(std::string_view rest) {
   return source;
 }
 
-View view_around(const Scene& scene) {
+std::pair<dvec3, dvec3> box_of(const Scene& scene) {
   dvec3 low = scene.positions[0], high = low;
   for (const dvec3& p : scene.positions) low = glm::min(low, p), high = glm::max(high, p);
+  return {low, high};
+}
+
+View view_around(const Scene& scene) {
+  const auto [low, high] = box_of(scene);
   return fitted_view(low, high);
 }
 
@@ -100,7 +105,13 @@ SceneSource load_scene(const std::string& name, const std::string& view_file, co
     }
   }
   if (!view_file.empty()) source.view = load_view(view_file);
+  const auto [low, high] = box_of(source.scene);
+  place_suns(source.view, low, high);
   return source;
+}
+
+void place_suns(View& view, const dvec3& low, const dvec3& high) {
+  for (Light& light : view.lights) light = place_sun(light, low, high);
 }
 
 StreamSource open_stream(const std::string& name, const std::string& view_file, const ObjLoadOptions& options,

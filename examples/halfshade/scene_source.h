@@ -22,6 +22,9 @@ SceneSource load_scene(const std::string& name, const std::string& view_file, co
 /// A camera that sees the box and a square light above it, for scenes that come without a view.
 View fitted_view(const dvec3& low, const dvec3& high);
 
+/// Gives the suns among the lights their place over the scene's box. load_scene does it by itself.
+void place_suns(View& view, const dvec3& low, const dvec3& high);
+
 /// The same scenes in pieces.
 struct StreamSource {
   SceneStream stream;

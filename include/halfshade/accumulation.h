@@ -15,13 +15,14 @@ namespace halfshade {
 /// the caller numbers them. Distinct accumulators may be used concurrently, one may not.
 class HALFSHADE_API VisibilityAccumulator {
  public:
+  /// Nothing counted yet.
   explicit VisibilityAccumulator(std::size_t entries = 0) : visible_(entries, 0), total_(entries, 0) {}
   /// Counts that were kept elsewhere. Throws Error{kBadInput} unless both have the same length and visible <= total.
   VisibilityAccumulator(std::vector<std::uint32_t> visible, std::vector<std::uint32_t> total);
 
-  std::size_t size() const { return visible_.size(); }
-  std::span<const std::uint32_t> visible() const { return visible_; }
-  std::span<const std::uint32_t> total() const { return total_; }
+  std::size_t size() const { return visible_.size(); }                 // number of entries
+  std::span<const std::uint32_t> visible() const { return visible_; }  // [entry] visible samples
+  std::span<const std::uint32_t> total() const { return total_; }      // [entry] samples asked
 
   /// Adds one frame: receiver i of `masks` is entry entries[i]; no entry occurs twice. Throws Error{kUsage} when the
   /// lengths differ or an entry is out of range, Error{kLimit} when a count would exceed 32 bits; nothing is added
@@ -67,17 +68,19 @@ HALFSHADE_API VisibilityError visibility_error(const VisibilityAccumulator& a, c
 /// whose camera moves from frame to frame by fractions of a pixel, where visibility alone cannot be averaged.
 class HALFSHADE_API ColorAccumulator {
  public:
+  /// Nothing added yet.
   explicit ColorAccumulator(std::size_t values = 0) : sums_(values, 0) {}
   /// Sums that were kept elsewhere.
   ColorAccumulator(std::vector<std::uint64_t> sums, std::uint32_t frames) : sums_(std::move(sums)), frames_(frames) {}
 
-  std::size_t size() const { return sums_.size(); }
-  std::span<const std::uint64_t> sums() const { return sums_; }
-  std::uint32_t frames() const { return frames_; }
+  std::size_t size() const { return sums_.size(); }              // values per frame
+  std::span<const std::uint64_t> sums() const { return sums_; }  // [value] in units of 2^-20
+  std::uint32_t frames() const { return frames_; }               // frames added
 
   /// Adds one frame of size() values, each clamped to [0, 65536]; NaN counts as 0. Throws Error{kUsage} for another
   /// length, Error{kLimit} beyond 2^25 frames.
   void add(std::span<const float> values);
+  /// Adds the sums of another accumulator of the same size. Throws as add.
   void merge(const ColorAccumulator& other);
   /// Mean of a value over the frames added; 0 if there are none.
   float mean(std::size_t value) const {

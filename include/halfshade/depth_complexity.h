@@ -6,11 +6,13 @@
 
 namespace halfshade {
 
+/// Numbers of crossed triangles, as solve_depth_complexity fills them in.
 struct HALFSHADE_API DepthComplexity {
-  std::size_t receiver_count = 0;
-  std::uint32_t sample_count = 0;
+  std::size_t receiver_count = 0;     // as many as were asked for
+  std::uint32_t sample_count = 0;     // per receiver
   std::vector<std::uint32_t> counts;  // [receiver][sample]: triangles crossed at an opaque texel
 
+  /// Triangles between this receiver and this sample.
   std::uint32_t count(std::size_t receiver, std::uint32_t sample) const {
     return counts[receiver * sample_count + sample];
   }

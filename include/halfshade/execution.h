@@ -10,7 +10,9 @@ namespace halfshade {
 /// valid until the host's parallel_for returns. May be called from any thread, by several at once, in any order.
 class TaskBody {
  public:
+  /// Calls run(context, index).
   TaskBody(void (*run)(const void* context, std::size_t index), const void* context) : run_(run), context_(context) {}
+  /// Does piece `index` of the work. Never throws.
   void operator()(std::size_t index) const { run_(context_, index); }
 
  private:
@@ -18,6 +20,7 @@ class TaskBody {
   const void* context_;
 };
 
+/// Who runs the loops of a call.
 enum class Executor {
   kArena,   // TBB, in the arena of the calling thread
   kSerial,  // the calling thread alone; no TBB function is called
@@ -26,7 +29,7 @@ enum class Executor {
 
 /// How one call runs. Results never depend on it.
 struct Execution {
-  Executor executor = Executor::kArena;
+  Executor executor = Executor::kArena;  // who runs the loops
 
   /// kHost: calls body(i) exactly once for every i in [0, count), on threads of its choice, and returns when all of
   /// these calls have returned. `body` never throws. Loops may be nested: a body may call parallel_for again. If it

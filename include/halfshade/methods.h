@@ -9,6 +9,7 @@
 
 namespace halfshade {
 
+/// How shadows are found; in quotes, the method's name on the command line.
 enum class ShadowMethod {
   kExact,                        // "exact": ours, receivers gather from a tree of blockers
   kAliasFreeShadowMap,           // "afsm": Sintorn, Eisemann, Assarsson 2008
@@ -27,29 +28,30 @@ enum class ShadowMethod {
 
 /// What a method promises.
 struct MethodTraits {
-  ShadowMethod method;
-  const char* name;
-  bool exact;  // masks equal the oracle's in every bit
-  bool masks;  // yields masks (solve_shadows); the others yield visibility only (solve_visibility)
+  ShadowMethod method;  // itself
+  const char* name;     // as on the command line
+  bool exact;           // masks equal the oracle's in every bit
+  bool masks;           // yields masks (solve_shadows); the others yield visibility only (solve_visibility)
 };
 
 /// All methods, in the order of the enumeration.
 HALFSHADE_API std::span<const MethodTraits> shadow_methods();
+/// The entry of that method.
 HALFSHADE_API const MethodTraits& traits_of(ShadowMethod method);
 
 /// Outline of the part of the light view that a blocker can matter to. All hold the region; they differ in how tightly.
 enum class InfluenceOutline {
   kHull,       // hull of the light's own outline seen through the corners; spheres: a hexagon around their silhouette
-  kHexagon,    // the same with 6, 8 or 12 corners around the silhouette of the light's bounding sphere
-  kOctagon,    //
-  kDodecagon,  //
+  kHexagon,    // as many corners, 6, around the silhouette of the light's bounding sphere
+  kOctagon,    // 8 corners
+  kDodecagon,  // 12 corners
   kBox,        // box of the hull along the grid's axes
   kQuad,       // smallest rectangle around the hull
 };
 
 /// afsm, afsm-lut. No option changes a bit of afsm; the approximate masks of afsm-lut depend on all of them.
 struct AliasFreeOptions {
-  InfluenceOutline region = InfluenceOutline::kHull;
+  InfluenceOutline region = InfluenceOutline::kHull;  // how tightly blockers are bounded
   bool fit = true;               // grid over the receivers' slopes; otherwise over those of the whole scene
   bool far_fit = true;           // far plane at the farthest receiver; otherwise at the scene's farthest corner
   bool skip_empty = true;        // skip cells without receivers beyond the blocker
@@ -80,8 +82,8 @@ enum class GearsRegion {
 
 /// gears. None of them changes a mask.
 struct GearsOptions {
-  std::uint32_t grid = 0;  // cells per axis, 8..1024; 0 = from the number of receivers
-  GearsRegion region = GearsRegion::kBox;
+  std::uint32_t grid = 0;                  // cells per axis, 8..1024; 0 = from the number of receivers
+  GearsRegion region = GearsRegion::kBox;  // how tightly shadow volumes are bounded
   bool refine = false;  // keep a (blocker, cell) pair only if a receiver of the cell is in the 3-D frustum (figure 11)
   bool subdivide = true;  // cells with many receivers get a grid of their own
   bool bounds = true;     // cells shrink to the box and depth of their receivers, and shadow volumes to that depth
@@ -105,8 +107,8 @@ enum class OpacityFilter {
 
 /// stsv.
 struct ShadowVolumeOptions {
-  OpaqueBlockers opaque = OpaqueBlockers::kExact;
-  OpacityFilter filter = OpacityFilter::kNearest;
+  OpaqueBlockers opaque = OpaqueBlockers::kExact;  // who decides about opaque triangles
+  OpacityFilter filter = OpacityFilter::kNearest;  // how opacity textures are read
 };
 
 /// How shadow-accumulation joins what its lexels hide.
@@ -121,12 +123,12 @@ struct ShadowMapOptions {
   /// A lexel hides a receiver where its depth is smaller than the receiver's by more than `bias` lexel widths, and its
   /// point lies above the receiver's tangent plane by more than `slope_bias` lexel widths; 0..64 each.
   float bias = 0.5f, slope_bias = 0.5f;
-  std::uint32_t pcf_radius = 2;    // pcf: (2 radius + 1)^2 lexels are compared, 0..64
-  std::uint32_t pcss_search = 9;   // pcss: lookups per axis of the blocker search, 1..64
-  std::uint32_t pcss_filter = 15;  // pcss: lookups per axis of the filter, 1..64
-  std::uint32_t kernel = 10;       // shadow-accumulation: lookups per axis (the paper's K), 1..64
-  AccumulationForm form = AccumulationForm::kBits;
-  std::uint32_t layers = 1;  // shadow-accumulation: depth layers peeled at most, 1..64
+  std::uint32_t pcf_radius = 2;                     // pcf: (2 radius + 1)^2 lexels are compared, 0..64
+  std::uint32_t pcss_search = 9;                    // pcss: lookups per axis of the blocker search, 1..64
+  std::uint32_t pcss_filter = 15;                   // pcss: lookups per axis of the filter, 1..64
+  std::uint32_t kernel = 10;                        // shadow-accumulation: lookups per axis (the paper's K), 1..64
+  AccumulationForm form = AccumulationForm::kBits;  // shadow-accumulation: how lexels are joined
+  std::uint32_t layers = 1;                         // shadow-accumulation: depth layers peeled at most, 1..64
   bool refine = true;  // shadow-accumulation: a second kernel, no larger than the casters that the first one saw need
   float plane = 0.0f;  // shadow-accumulation: the map plane's distance in light radii, 1..1e6; 0 = nearest caster
 };

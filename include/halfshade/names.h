@@ -9,9 +9,11 @@ namespace halfshade {
 
 /// "exact", "afsm" ... Throws Error{kUsage} listing the known names, here and below.
 HALFSHADE_API ShadowMethod shadow_method_from_name(const std::string& name);
+/// The same the other way, here and below.
 HALFSHADE_API const char* name_of(ShadowMethod method);
 /// "rows", "uniform" ...
 HALFSHADE_API SamplePattern sample_pattern_from_name(const std::string& name);
+/// "rows", "uniform" ...
 HALFSHADE_API const char* name_of(SamplePattern pattern);
 
 /// `assignment` is "method.option=value", for instance "hpc.leaf=8". Throws Error{kUsage} for unknown options, and for

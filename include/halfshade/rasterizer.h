@@ -12,6 +12,7 @@ namespace halfshade {
 struct GBuffer {
   std::uint32_t width = 0, height = 0;  // the whole picture, in samples
   PixelWindow window;                   // the part held here, in samples
+  double reach = 1.0;                   // power of two, at least every |coordinate| of what was drawn; local frame
   std::vector<std::uint32_t> triangle;  // visible triangle, or kNone
   std::vector<dvec3> position;          // local frame, interpolated in double, not snapped
   std::vector<vec3> geometric_normal;   // unit, on the camera's side of the triangle
@@ -20,13 +21,14 @@ struct GBuffer {
   std::vector<vec3> albedo;  // linear RGB
   std::vector<float> depth;  // distance along the camera's axis, local frame units
 
-  std::size_t size() const { return triangle.size(); }
+  std::size_t size() const { return triangle.size(); }  // number of entries
 };
 
+/// Which picture is wanted.
 struct RasterConfig {
-  std::uint32_t width = 512,
-                height = 512;  // whole picture in samples (pixels times subsamples per axis); 1..16384 each
-  PixelWindow window;          // part to render, in samples; all zero = whole picture
+  /// Whole picture in samples (pixels times subsamples per axis); 1..16384 each.
+  std::uint32_t width = 512, height = 512;
+  PixelWindow window;  // part to render, in samples; all zero = whole picture
   /// Moves the centres of all samples: sample (x, y) looks through (x + 0.5, y + 0.5) + offset. In samples, each axis
   /// in [-1, 1]. Another offset in every frame, averaged, smooths edges (box filter for offsets all over
   /// [-0.5, 0.5)^2).

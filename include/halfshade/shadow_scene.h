@@ -21,6 +21,7 @@ struct MeshView {
   vec3 albedo{0.8f};                // linear RGB; for GBuffer::albedo alone
 };
 
+/// How a scene keeps its tree. Changes no result.
 struct SceneConfig {
   /// The order of the tree over the triangles is made anew once moving meshes have made it this much worse (expected
   /// cost of a query, relative to the tree as built); 0 = never. Changes no result.
@@ -45,7 +46,8 @@ struct SceneStats {
 
 /// Triangle `triangle` of mesh `mesh`, as the caller numbers them.
 struct MeshTriangle {
-  std::uint32_t mesh = kNone, triangle = kNone;
+  std::uint32_t mesh = kNone;      // what add_mesh() returned
+  std::uint32_t triangle = kNone;  // in that mesh, from 0
 
   bool operator==(const MeshTriangle&) const = default;
 };
@@ -63,6 +65,7 @@ struct MeshTriangle {
 /// commit() that throws leaves the scene uncommitted, with all noted changes, and may be called again.
 class HALFSHADE_API ShadowScene {
  public:
+  /// An empty scene, to be committed like any other. Throws Error{kUsage} for a configuration out of range.
   explicit ShadowScene(const SceneConfig& config = {});
   ~ShadowScene();
   ShadowScene(ShadowScene&&) noexcept;
@@ -80,11 +83,13 @@ class HALFSHADE_API ShadowScene {
   void remove_mesh(std::uint32_t mesh);
   /// New object-space positions, as many as before; triangles stay.
   void set_positions(std::uint32_t mesh, const PointView& positions);
+  /// Another place for the mesh. Throws Error{kBadInput} for values that are not finite.
   void set_transform(std::uint32_t mesh, const Transform& transform);
 
   /// Widens the box that the frame is made for: where lights and receivers will be that lie far from all meshes. It
   /// never shrinks. Throws Error{kBadInput} for positions that are not finite.
   void extend(const PointView& points_world);
+  /// The same for all of a light.
   void extend(const Light& light);
 
   /// Does all that changed. Costs nothing when nothing did. Throws Error{kCancelled} and what `execution` throws.
@@ -99,7 +104,7 @@ class HALFSHADE_API ShadowScene {
   /// Which triangle has this number in a G-buffer or a picture of this scene. Of the last commit. Throws Error{kUsage}.
   MeshTriangle triangle_of(std::uint32_t number) const;
 
-  const SceneStats& stats() const;
+  const SceneStats& stats() const;  // counters since the scene was made
 
   struct HALFSHADE_LOCAL Impl;
   const Impl& impl() const { return *impl_; }  // for the library's own use

@@ -48,9 +48,10 @@ struct ShadowOutput {
 /// Counters and times of one call, summed over its lights.
 struct SolveStats : ShadowStats {
   std::uint64_t lights_kept = 0;  // whose samples and tree were still there from an earlier call
-  std::uint64_t lights_made = 0;
+  std::uint64_t lights_made = 0;  // whose samples and tree were made by this call
 };
 
+/// What a workspace keeps between calls.
 struct WorkspaceConfig {
   /// Lights whose samples and tree (about 220 bytes per triangle) are kept from call to call, 1..256. Light number i of
   /// a call uses place i modulo this: what was there before is replaced.
@@ -66,6 +67,7 @@ struct WorkspaceConfig {
 /// Error{kUsage}.
 class HALFSHADE_API Workspace {
  public:
+  /// Allocates little; the first call does. Throws Error{kUsage} for a configuration out of range.
   explicit Workspace(const WorkspaceConfig& config = {});
   ~Workspace();
   Workspace(Workspace&&) noexcept;
@@ -73,7 +75,7 @@ class HALFSHADE_API Workspace {
 
   /// Gives all memory back; the next call starts from nothing.
   void clear();
-  std::uint64_t bytes() const;
+  std::uint64_t bytes() const;  // memory held now
   /// Of the last call that returned or threw.
   const SolveStats& stats() const;
 
@@ -96,12 +98,13 @@ class HALFSHADE_API ShadowSolver {
   /// Throws Error{kUsage} for a configuration out of range, and for method raytrace, which is not in the library.
   /// config.progress is called if the Execution of a call has none. For method exact, back_face_casters is the scene's.
   explicit ShadowSolver(const ShadowConfig& config = {});
-  const ShadowConfig& config() const { return config_; }
+  const ShadowConfig& config() const { return config_; }  // as given
 
   /// Number of samples of a light: config().light_sample_count, 1 for points, their number for explicit samples.
   std::uint32_t sample_count(const Light& light) const;
   /// 64-bit words per receiver and light that hold the masks of any of these lights.
   std::size_t mask_words(std::span<const Light> lights) const;
+  /// The same for one light.
   std::size_t mask_words(const Light& light) const { return mask_words({&light, 1}); }
 
   /// Throws Error{kUsage}: scene not committed, workspace in use, wrong length of a span, masks or irradiance from a

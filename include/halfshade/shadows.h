@@ -12,20 +12,21 @@
 
 namespace halfshade {
 
+/// How light samples are spread over the light's area (docs/sampling.md).
 enum class SamplePattern {
   kRows,            // rows of equal height share v, each row shifted by its own lattice offset
-  kUniform,         // cell centres
+  kUniform,         // cell centres, row by row: of k * k samples, i is in column i mod k of row i / k
   kStratified,      // one jittered sample per cell
   kLowDiscrepancy,  // scrambled (0,2)-sequence; nested: the first samples of a larger number are those of a smaller one
   kPoissonDisk,     // no two samples near each other (measured on the torus); nested as well
 };
 
-/// Defaults here, set by designated initialisers.
+/// Defaults here, set by designated initialisers. A member that belongs to one method is ignored by the others.
 struct ShadowConfig {
-  ShadowMethod method = ShadowMethod::kExact;
-  std::uint32_t light_sample_count = 256;  // 1..4096; point lights always use 1, explicit samples their own number
-  SamplePattern pattern = SamplePattern::kRows;
-  std::uint32_t sample_sets = 1;  // 1..256 different sets, chosen per receiver by hash(pixel, seed)
+  ShadowMethod method = ShadowMethod::kExact;  // how shadows are found
+  std::uint32_t light_sample_count = 256;      // 1..4096; point lights always use 1, explicit samples their own number
+  SamplePattern pattern = SamplePattern::kRows;  // where the samples lie on the light
+  std::uint32_t sample_sets = 1;                 // 1..256 different sets, chosen per receiver by hash(pixel, seed)
   /// 16 sets, chosen by (x mod 4, y mod 4) of the receiver's place in the picture instead of by hash (Keller and
   /// Heidrich 2001; Forest, Barthe, Paulin 2009, figure 5); by number mod 16 for explicit receivers. sample_sets counts
   /// for nothing then.
@@ -41,29 +42,32 @@ struct ShadowConfig {
   /// Temporal jitter: set k of frame f is element f + k of the pattern's sequence of sets, so every frame shows each
   /// receiver other samples. Point lights and explicit samples are the same in every frame. 0 .. 2^25 - 1.
   std::uint32_t frame = 0;
-  AliasFreeOptions afsm = {};
-  PenumbraCastingOptions hpc = {};
-  GearsOptions gears = {};
-  ShadowVolumeOptions stsv = {};
-  ShadowMapOptions shadow_map = {};
-  RaytraceOptions raytrace = {};
+  AliasFreeOptions afsm = {};        // methods afsm, afsm-lut
+  PenumbraCastingOptions hpc = {};   // method hpc
+  GearsOptions gears = {};           // method gears
+  ShadowVolumeOptions stsv = {};     // method stsv
+  ShadowMapOptions shadow_map = {};  // methods with depth maps
+  RaytraceOptions raytrace = {};     // method raytrace
 };
 
 /// Blocked masks of all receivers: bit i of a receiver's words is set where light sample i is hidden.
 struct HALFSHADE_API VisibilityMasks {
-  std::size_t receiver_count = 0;
-  std::uint32_t sample_count = 0;
-  std::size_t words_per_receiver = 0;
-  std::vector<std::uint64_t> words;  // [receiver][word], row-major; bits past sample_count are zero
+  std::size_t receiver_count = 0;      // as many as were asked for
+  std::uint32_t sample_count = 0;      // per receiver
+  std::size_t words_per_receiver = 0;  // sample_count / 64, rounded up
+  std::vector<std::uint64_t> words;    // [receiver][word], row-major; bits past sample_count are zero
 
+  /// Room for that many receivers and samples, nothing blocked.
   void reset(std::size_t receivers, std::uint32_t samples);
+  /// The words of one receiver.
   std::span<const std::uint64_t> mask(std::size_t receiver) const {
     return {words.data() + receiver * words_per_receiver, words_per_receiver};
   }
+  /// Is this sample hidden from this receiver?
   bool blocked(std::size_t receiver, std::uint32_t sample) const {
     return (words[receiver * words_per_receiver + sample / 64] >> (sample % 64)) & 1;
   }
-  std::uint32_t blocked_count(std::size_t receiver) const;
+  std::uint32_t blocked_count(std::size_t receiver) const;  // number of hidden samples
   /// Fraction of samples not hidden, in [0, 1].
   float visibility(std::size_t receiver) const {
     return 1.0f - static_cast<float>(blocked_count(receiver)) / static_cast<float>(sample_count);
@@ -74,11 +78,11 @@ struct HALFSHADE_API VisibilityMasks {
 
 /// Counters and times of one solve. Milliseconds are wall time.
 struct ShadowStats {
-  double build_ms = 0.0;  // what a static scene keeps: certificates, tree
-  double index_ms = 0.0;  // receivers into the light view's lists
-  double cull_ms = 0.0;   // influence regions of the blockers
-  double test_ms = 0.0;   // blockers against receivers and samples
-  std::uint64_t receivers = 0, triangles = 0;
+  double build_ms = 0.0;                                // what a static scene keeps: certificates, tree
+  double index_ms = 0.0;                                // receivers into the light view's lists
+  double cull_ms = 0.0;                                 // influence regions of the blockers
+  double test_ms = 0.0;                                 // blockers against receivers and samples
+  std::uint64_t receivers = 0, triangles = 0;           // that were asked about, that may block
   std::uint64_t pairs_tested = 0;                       // (blocker, receiver) pairs that reached the kernel
   std::uint64_t pairs_sampled = 0;                      // of these, tested sample by sample
   std::uint64_t pairs_necessary = 0;                    // of these, added at least one blocked bit
@@ -104,7 +108,7 @@ struct ShadowStats {
 
 /// A surface point that asks for the light.
 struct Receiver {
-  dvec3 position_world{0.0};
+  dvec3 position_world{0.0};       // finite
   std::uint32_t triangle = kNone;  // the triangle it lies on, which never blocks it; kNone if none
 };
 

@@ -21,6 +21,7 @@ struct SceneStream {
   std::function<bool(Scene& piece)> next;
 };
 
+/// Where the files go, and how much memory the masks may take.
 struct StreamOptions {
   std::filesystem::path directory;  // of the files, which have no names and vanish with the process; empty = system's
   std::uint64_t max_bytes = 0;      // receivers are split into parts so that the masks fit into this; 0 = one part

@@ -21,8 +21,8 @@ using nlohmann::ordered_json;
 constexpr std::size_t kMostSamples = 4096;
 constexpr std::size_t kMostCorners = 64;  // of a polygon; that it is flat and convex is checked where it is used
 constexpr std::uint64_t kMostFileBytes = std::uint64_t{16} << 20;
-constexpr const char* kShapeNames[] = {"point",   "rectangle", "disk",   "sphere",
-                                       "samples", "ellipsoid", "polygon"};  // by LightShape
+constexpr const char* kShapeNames[] = {"point",   "rectangle", "disk",    "sphere",
+                                       "samples", "ellipsoid", "polygon", "sun"};  // by LightShape
 
 /// A value of the file together with where it is, for messages.
 class Node {
@@ -197,6 +197,12 @@ void read_geometry(const Node& node, Light& light) {
       node.require_keys({"name", "type", "emission", "two_sided", "vertices"});
       light.points = read_points(node.at("vertices"), 3, kMostCorners);
       break;
+    case LightShape::kSun:
+      node.require_keys({"name", "type", "emission", "direction", "angular_diameter_deg"});
+      light.normal = node.at("direction").nonzero_vector();
+      if (node.has("angular_diameter_deg")) light.angular_diameter_deg = node.at("angular_diameter_deg").positive();
+      if (light.angular_diameter_deg > 60.0) throw node.at("angular_diameter_deg").refuse("a number above 0, up to 60");
+      break;
   }
 }
 
@@ -253,6 +259,9 @@ ordered_json to_object(const Light& light) {
   } else if (light.shape == LightShape::kSamples || light.shape == LightShape::kPolygon) {
     const char* key = light.shape == LightShape::kPolygon ? "vertices" : "points";
     for (const dvec3& point : light.points) object[key].push_back(to_array(point));
+  } else if (light.shape == LightShape::kSun) {
+    object["direction"] = to_array(light.normal);
+    object["angular_diameter_deg"] = light.angular_diameter_deg;
   } else {
     object["center"] = to_array(light.center);
   }

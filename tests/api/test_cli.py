@@ -193,6 +193,16 @@ class EqualBits(CommandLine):
         self.assertEqual(self.mask_hash(), self.mask_hash("--method", "oracle"))
         self.expect(OK, *small("--verify", 100))
 
+    def test_a_sun_gets_its_place_from_the_scene_in_memory_and_streamed(self):
+        view = self.directory / "sun.json"
+        view.write_text(json.dumps({"camera": {"eye": [0, 3, 7], "target": [0, 1, 0]}, "lights": [
+            {"name": "sun", "type": "sun", "direction": [-0.4, -1, -0.3], "angular_diameter_deg": 2}]}))
+        whole = self.expect(OK, *small("--view", view, "--method", "hpc", "--verify", 100)).stdout
+        streamed = self.expect(OK, *small("--view", view, "--stream")).stdout
+        hashes = [[line for line in text.splitlines() if "mask hash" in line] for text in (whole, streamed)]
+        self.assertTrue(hashes[0])
+        self.assertEqual(*hashes)
+
     def test_a_crop_has_the_masks_of_the_full_picture(self):
         full = masks_of_pixels(self.dump("full"))
         x0, x1, y0, y1 = 11, 39, 9, 27

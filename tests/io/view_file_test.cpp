@@ -19,13 +19,15 @@ test::Outcome load(const std::string& text) {
 View make_view() {
   View view;
   view.camera = {{0.1, 0.2, 5.3}, {1.0 / 3.0, -2.0, 0.0}, {0.0, 0.9, 0.1}, 38.7};
-  view.lights.resize(7);
+  view.lights.resize(8);
   for (std::size_t i = 0; i < view.lights.size(); ++i) {
     Light& light = view.lights[i];
     light.name = "light " + std::to_string(i);
     light.shape = static_cast<LightShape>(i);
     light.emission = vec3(0.1f, 2.0f, 0.3f);
-    if (light.shape != LightShape::kSamples && light.shape != LightShape::kPolygon) light.center = {0.1, 4.7, -0.3};
+    if (light.shape != LightShape::kSamples && light.shape != LightShape::kPolygon && light.shape != LightShape::kSun) {
+      light.center = {0.1, 4.7, -0.3};
+    }
   }
   view.lights[1].u = {0.3, 0.0, 0.1};
   view.lights[1].v = {0.0, 0.7, 0.1};
@@ -36,6 +38,8 @@ View make_view() {
   view.lights[5].axes = {dvec3(0.1, 0.2, 0.3), dvec3(-1.0 / 3.0, 1, 0), dvec3(0, 0.7, 0.1)};
   view.lights[6].points = {{0, 4, 0}, {1, 4, 0}, {1.0 / 3.0, 4, 1}};
   view.lights[6].two_sided = true;
+  view.lights[7].normal = {0.1, -0.9, 1.0 / 3.0};
+  view.lights[7].angular_diameter_deg = 1.0 / 3.0;
   return view;
 }
 
@@ -58,6 +62,7 @@ TEST_CASE("a view of all light types survives writing and reading to the last bi
     CHECK(a.v == b.v);
     CHECK(a.normal == b.normal);
     CHECK(a.radius == b.radius);
+    CHECK(a.angular_diameter_deg == b.angular_diameter_deg);
     CHECK(a.points == b.points);
     CHECK(a.axes == b.axes);
     CHECK(a.two_sided == b.two_sided);
@@ -133,8 +138,12 @@ TEST_CASE("wrong cameras are refused with file, place, value and what is allowed
 
 TEST_CASE("wrong lights are refused with file, place, value and what is allowed") {
   const std::pair<const char*, const char*> lights[] = {
-      {R"({"type": "sun", "direction": [0, -1, 0]})",
-       "/lights/0/type: '\"sun\"', allowed one of point, rectangle, disk, sphere, samples, ellipsoid, polygon"},
+      {R"({"type": "moon", "direction": [0, -1, 0]})",
+       "/lights/0/type: '\"moon\"', allowed one of point, rectangle, disk, sphere, samples, ellipsoid, polygon, sun"},
+      {R"({"type": "sun", "direction": [0, 0, 0]})", "/lights/0/direction"},
+      {R"({"type": "sun", "direction": [0, -1, 0], "angular_diameter_deg": 61})",
+       "/lights/0/angular_diameter_deg: '61', allowed a number above 0, up to 60"},
+      {R"({"type": "sun", "direction": [0, -1, 0], "center": [0, 4, 0]})", "unknown key 'center'"},
       {R"({"type": "polygon", "vertices": [[0, 4, 0], [1, 4, 0]]})", "/lights/0/vertices: 2 points, allowed 3..64"},
       {R"({"type": "ellipsoid", "center": [0, 4, 0], "axes": [[1, 0, 0], [0, 1, 0]]})",
        "/lights/0/axes: '[[1,0,0],[0,1,0]]', allowed three vectors"},
