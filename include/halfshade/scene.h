@@ -41,7 +41,7 @@ struct Material {
   }
 };
 
-/// Indexed triangles. Positions are finite; indices are in range (the loaders check, Scene does not).
+/// Indexed triangles. Positions are finite; indices are in range (the loaders and solves check, Scene does not).
 struct Scene {
   std::string name;
   std::vector<dvec3> positions;                         // world space
