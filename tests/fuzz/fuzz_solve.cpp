@@ -1,12 +1,9 @@
 // Small scenes, lights and receivers made of the input's bytes, degenerate and broken ones among them. What the oracle
 // answers, an exact method must answer bit by bit; what it refuses, the method must refuse.
-#include <bit>
 #include <cmath>
-#include <limits>
 
-#include "fuzz/fuzz_target.h"
+#include "fuzz/coordinates.h"
 #include "halfshade/shadows.h"
-#include "rasterizer/core/lattice.h"
 
 namespace halfshade::fuzz {
 namespace {
@@ -41,13 +38,13 @@ class SceneReader {
     Light light;
     light.shape = static_cast<LightShape>(in_.below(7));
     light.two_sided = in_.flag();
-    light.center = point();
-    light.u = point(), light.v = point();
+    light.center = in_.point();
+    light.u = in_.point(), light.v = in_.point();
     light.normal = light.u;
-    light.radius = std::fabs(coordinate());
-    light.axes = {light.u, light.v, point()};
+    light.radius = std::fabs(in_.coordinate());
+    light.axes = {light.u, light.v, in_.point()};
     if (light.shape == LightShape::kSamples || light.shape == LightShape::kPolygon) {
-      for (std::uint32_t n = in_.below(6); n > 0; --n) light.points.push_back(point());
+      for (std::uint32_t n = in_.below(6); n > 0; --n) light.points.push_back(in_.point());
     }
     return light;
   }
@@ -62,15 +59,17 @@ class SceneReader {
       scene.alpha_maps.push_back({"a", 2, 2, {255, 0, 0, static_cast<std::uint8_t>(alpha)}});
     }
     if ((alpha & 6) == 6) scene.materials[0].opacity = 0.5f;
-    for (std::uint32_t n = in_.below(24); n > 0; --n) scene.positions.push_back(point());
+    for (std::uint32_t n = in_.below(24); n > 0; --n) scene.positions.push_back(in_.point());
     const auto points = static_cast<std::uint32_t>(scene.positions.size());
     for (std::uint32_t n = in_.below(24); n > 0 && points > 0; --n) {
-      const auto index = [&] { return broken() ? in_.take<std::uint32_t>() : in_.below(points); };
+      const auto index = [&] { return in_.broken() ? in_.take<std::uint32_t>() : in_.below(points); };
       const std::uint32_t a = index(), b = index(), c = index();
       scene.triangles.push_back({a, b, c});
       scene.triangle_materials.push_back(in_.flag());
       if (perforated) {
-        const auto uv = [&] { return vec2(static_cast<float>(coordinate()), static_cast<float>(coordinate())); };
+        const auto uv = [&] {
+          return vec2{static_cast<float>(in_.coordinate()), static_cast<float>(in_.coordinate())};
+        };
         const vec2 first = uv(), second = uv();
         scene.triangle_uvs.push_back({first, second, uv()});
       }
@@ -81,41 +80,16 @@ class SceneReader {
   std::vector<Receiver> receivers(std::size_t triangles) {
     std::vector<Receiver> result;
     for (std::uint32_t n = in_.below(12); n > 0; --n) {
-      const dvec3 p = point();
+      const dvec3 p = in_.point();
       const bool owned = triangles > 0 && in_.flag();
       const auto last = static_cast<std::uint32_t>(triangles);
-      result.push_back({p, owned ? (broken() ? in_.take<std::uint32_t>() : in_.below(last)) : kNone});
+      result.push_back({p, owned ? (in_.broken() ? in_.take<std::uint32_t>() : in_.below(last)) : kNone});
     }
     return result;
   }
 
  private:
-  /// Rarely, so that most inputs get past the checks of indices.
-  bool broken() { return in_.byte() == 255; }
-
-  dvec3 point() {
-    const double x = coordinate(), y = coordinate();
-    return {x, y, coordinate()};
-  }
-
-  /// Mostly eighths between -12 and 12, which coincide and align; else the last one moved by a little, an extreme value
-  /// or any bits at all.
-  double coordinate() {
-    const std::uint32_t kind = in_.byte();
-    if (kind < 193) return last_ = (static_cast<double>(kind) - 96.0) / 8.0;
-    if (kind < 209) return last_;
-    if (kind < 225) return last_ += std::ldexp(static_cast<double>(kind) - 216.5, -40);
-    constexpr double inf = std::numeric_limits<double>::infinity();
-    constexpr double extreme[] = {0.0,   -0.0,   1e-320, 1e-30, 1e-9,
-                                  1e6,   -1e6,   1e9,    1e30,  1e150,
-                                  1e300, -1e300, inf,    -inf,  std::numeric_limits<double>::quiet_NaN()};
-    if (kind < 240) return extreme[kind - 225];
-    if (kind < 248) return in_.take<float>();
-    return in_.take<double>();
-  }
-
-  ByteReader in_;
-  double last_ = 0.0;
+  CoordinateReader in_;
 };
 
 }  // namespace

@@ -47,12 +47,7 @@ const ProcessDirectory& process_directory() {
   return directory;
 }
 
-constexpr Target kTargets[] = {{"obj", fuzz_obj},     {"mtl", fuzz_mtl}, {"view", fuzz_view},
-                               {"image", fuzz_image}, {"npy", fuzz_npy}, {"solve", fuzz_solve}};
-
 }  // namespace
-
-std::span<const Target> targets() { return kTargets; }
 
 void require(bool holds, const std::string& what) {
   if (holds) return;

@@ -27,12 +27,6 @@ void fuzz_image(Bytes input);  // PNG, JPEG, EXR as texture, opacity and emissio
 void fuzz_npy(Bytes input);    // NPY: what was read is written and read back in every bit
 void fuzz_solve(Bytes input);  // small scenes: an exact method against the oracle
 
-struct Target {
-  const char* name;
-  void (*run)(Bytes input);
-};
-std::span<const Target> targets();
-
 /// Ends the process with a message where `holds` is false.
 void require(bool holds, const std::string& what);
 

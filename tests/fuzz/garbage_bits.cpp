@@ -116,7 +116,7 @@ class Garbage {
     dvec3& target = choice % 4 < 2 ? c.light.center : c.receivers[1].position_world;
     for (int axis = 0; axis < 3; ++axis) target[axis] = coordinate(Kind::kDoubleBits);
     c.light.radius = 1.0;
-    c.fault = is_finite(target) ? "" : "light 'light': a coordinate is not finite";
+    c.fault = is_finite(target) ? "" : "light 'light': a coordinate or the extent is not finite";
     if (&target != &c.light.center && !is_finite(target)) c.fault = "receiver 1: the position is not finite";
     // A box corner beyond the largest double is an extent that is not finite.
     if (c.fault.empty() && std::max({std::fabs(target.x), std::fabs(target.y), std::fabs(target.z)}) > 0x1p1022) {

@@ -17,6 +17,14 @@
 namespace {
 
 namespace fs = std::filesystem;
+using namespace halfshade::fuzz;
+
+struct Target {
+  std::string_view name;
+  void (*run)(Bytes input);
+};
+constexpr Target kTargets[] = {{"obj", fuzz_obj},     {"mtl", fuzz_mtl}, {"view", fuzz_view},
+                               {"image", fuzz_image}, {"npy", fuzz_npy}, {"solve", fuzz_solve}};
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr double kMostSeconds = 10.0;  // of slower code
@@ -36,7 +44,7 @@ std::vector<fs::path> files_of(const fs::path& path) {
 
 std::vector<std::uint8_t> bytes_of(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  halfshade::fuzz::require(stream.good(), "readable: " + file.string());
+  require(stream.good(), "readable: " + file.string());
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
@@ -47,7 +55,7 @@ long peak_kilobytes() {
 }
 
 /// False when it took too long.
-bool replay(const halfshade::fuzz::Target& target, const fs::path& file) {
+bool replay(const Target& target, const fs::path& file) {
   const std::vector<std::uint8_t> input = bytes_of(file);
   std::printf("%s\n", file.c_str());
   std::fflush(stdout);
@@ -62,12 +70,11 @@ bool replay(const halfshade::fuzz::Target& target, const fs::path& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto targets = halfshade::fuzz::targets();
-  const auto named = [&](const halfshade::fuzz::Target& t) { return argc > 1 && t.name == std::string_view(argv[1]); };
-  const auto target = std::find_if(targets.begin(), targets.end(), named);
-  if (target == targets.end() || argc < 3) {
+  const auto target = std::find_if(std::begin(kTargets), std::end(kTargets),
+                                   [&](const Target& t) { return argc > 1 && t.name == argv[1]; });
+  if (target == std::end(kTargets) || argc < 3) {
     std::fprintf(stderr, "usage: fuzz_replay TARGET FILE_OR_DIRECTORY...; targets:");
-    for (const auto& t : targets) std::fprintf(stderr, " %s", t.name);
+    for (const Target& t : kTargets) std::fprintf(stderr, " %s", t.name.data());
     std::fprintf(stderr, "\n");
     return 2;
   }
