@@ -17,3 +17,8 @@ function(halfshade_target name)
     target_compile_definitions(${name} PRIVATE HWY_COMPILE_ONLY_SCALAR)
   endif()
 endfunction()
+
+# halfshade_hide_symbols(NAME): the parts of the library. Only what include/halfshade/export.h marks leaves the .so.
+function(halfshade_hide_symbols name)
+  set_target_properties(${name} PROPERTIES CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+endfunction()

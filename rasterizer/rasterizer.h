@@ -2,23 +2,10 @@
 #pragma once
 
 #include "halfshade/light.h"
+#include "halfshade/rasterizer.h"
 #include "rasterizer/core/mesh.h"
-#include "rasterizer/gbuffer.h"
 
 namespace halfshade {
-
-struct RasterConfig {
-  std::uint32_t width = 512,
-                height = 512;  // whole picture in samples (pixels times subsamples per axis); 1..16384 each
-  PixelWindow window;          // part to render, in samples; all zero = whole picture
-  /// Moves the centres of all samples: sample (x, y) looks through (x + 0.5, y + 0.5) + offset. In samples, each axis
-  /// in
-  /// [-1, 1]. Another offset in every frame, averaged, smooths edges (box filter for offsets all over [-0.5, 0.5)^2).
-  dvec2 subpixel_offset{0.0};
-};
-
-/// Element `frame` of a low-discrepancy sequence of offsets in [-0.5, 0.5)^2; element 0 is (0, 0).
-dvec2 subpixel_jitter(std::uint32_t frame);
 
 struct RasterStats {
   std::uint64_t triangles_in = 0;

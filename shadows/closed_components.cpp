@@ -13,22 +13,6 @@
 namespace halfshade {
 namespace {
 
-/// Equal positions get equal numbers.
-std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
-  std::vector<std::uint32_t> order(positions.size()), number(positions.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto before = [&](std::uint32_t a, std::uint32_t b) {
-    const vec3 &p = positions[a], &q = positions[b];
-    return p.x != q.x ? p.x < q.x : (p.y != q.y ? p.y < q.y : p.z < q.z);
-  };
-  parallel_sort(order, before);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
-    number[order[i]] = same ? number[order[i - 1]] : static_cast<std::uint32_t>(i);
-  }
-  return number;
-}
-
 std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<std::uint32_t>& number) {
   std::vector<EdgeUse> uses;
   uses.reserve(mesh.triangles.size() * 3);
@@ -64,6 +48,21 @@ class DisjointSets {
 };
 
 }  // namespace
+
+std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
+  std::vector<std::uint32_t> order(positions.size()), number(positions.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    const vec3 &p = positions[a], &q = positions[b];
+    return p.x != q.x ? p.x < q.x : (p.y != q.y ? p.y < q.y : p.z < q.z);
+  };
+  parallel_sort(order, before);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
+    number[order[i]] = same ? number[order[i - 1]] : static_cast<std::uint32_t>(i);
+  }
+  return number;
+}
 
 ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges) {
   const std::size_t count = mesh.triangles.size();
@@ -123,15 +122,20 @@ void withdraw_certificates(const LatticeMesh& mesh, const ReceiverArray& receive
 
 }  // namespace
 
-void certify(const LatticeMesh& mesh, const ReceiverArray& receivers, const ShadowConfig& config,
-             ClosedComponents& closed, KernelSamples& samples, ShadowStats& stats, std::vector<EdgeUse>* edges) {
-  if (!config.back_face_casters) return;
-  closed = find_closed_components(mesh, edges);
+void apply_certificates(const LatticeMesh& mesh, const ReceiverArray& receivers, const ClosedComponents& closed,
+                        KernelSamples& samples, ShadowStats& stats) {
   use_certificate(closed, samples);
   withdraw_certificates(mesh, receivers, samples);
   for (const std::uint32_t c : closed.of_triangle) {
     stats.certified_blockers += c != kNone && samples.closed_usable[c] != 0;
   }
+}
+
+void certify(const LatticeMesh& mesh, const ReceiverArray& receivers, const ShadowConfig& config,
+             ClosedComponents& closed, KernelSamples& samples, ShadowStats& stats, std::vector<EdgeUse>* edges) {
+  if (!config.back_face_casters) return;
+  closed = find_closed_components(mesh, edges);
+  apply_certificates(mesh, receivers, closed, samples, stats);
 }
 
 }  // namespace halfshade

@@ -40,6 +40,9 @@ void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
   }
 }
 
+/// Equal positions get equal numbers, below positions.size().
+std::vector<std::uint32_t> weld(const std::vector<vec3>& positions);
+
 /// Connects triangles across edges whose ends have equal positions. Static for a mesh: build once.
 /// `edges`, if given, gets all uses of edges, sorted.
 ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges = nullptr);
@@ -53,5 +56,9 @@ ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<Edg
 void certify(const LatticeMesh& mesh, const ReceiverArray& receivers, const ShadowConfig& config,
              ClosedComponents& closed, KernelSamples& samples, ShadowStats& stats,
              std::vector<EdgeUse>* edges = nullptr);
+
+/// The same with components that were found before.
+void apply_certificates(const LatticeMesh& mesh, const ReceiverArray& receivers, const ClosedComponents& closed,
+                        KernelSamples& samples, ShadowStats& stats);
 
 }  // namespace halfshade

@@ -8,6 +8,14 @@
 #include "shadows/sample_patterns.h"
 
 namespace halfshade {
+
+// Unit square to unit sphere, area-preserving (Archimedes' cylinder).
+dvec3 unit_sphere_point(const dvec2& st) {
+  const double z = 1.0 - 2.0 * st.y;
+  const dvec2 ring = std::sqrt(std::max(0.0, 1.0 - z * z)) * unit_circle(st.x);
+  return {ring.x, ring.y, z};
+}
+
 namespace {
 
 void make_orthonormal(const dvec3& normal, LightSamples& samples) {
@@ -25,18 +33,11 @@ dvec2 concentric_disk(const dvec2& st) {
   return std::fabs(a) > std::fabs(b) ? a * unit_circle(b / a * 0.125) : b * unit_circle(0.25 - a / b * 0.125);
 }
 
-/// Unit square to unit sphere, area-preserving (Archimedes' cylinder).
-dvec3 sphere_point(const dvec2& st) {
-  const double z = 1.0 - 2.0 * st.y;
-  const dvec2 ring = std::sqrt(std::max(0.0, 1.0 - z * z)) * unit_circle(st.x);
-  return {ring.x, ring.y, z};
-}
-
 void require(bool condition, const Light& light, const char* what) {
   if (!condition) throw Error(ErrorCode::kBadInput, "light '" + light.name + "': " + what);
 }
 
-void check(const Light& light, const ShadowConfig& config) {
+void check_numbers(const ShadowConfig& config) {
   if (config.light_sample_count < 1 || config.light_sample_count > 4096) {
     throw Error(ErrorCode::kUsage,
                 "light samples: " + std::to_string(config.light_sample_count) + " is not in 1..4096");
@@ -48,6 +49,9 @@ void check(const Light& light, const ShadowConfig& config) {
     throw Error(ErrorCode::kUsage,
                 "frame: " + std::to_string(config.frame) + " is not below " + std::to_string(kMaxFrames));
   }
+}
+
+void check_shape(const Light& light) {
   require(is_finite(light.center) && is_finite(light.u) && is_finite(light.v) && is_finite(light.normal) &&
               std::isfinite(light.radius),
           light, "a coordinate is not finite");
@@ -123,11 +127,11 @@ dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2
       return rotated(samples.axis_u * p.x + samples.axis_v * p.y, samples.axis_n, turn_of_set(set));
     }
     case LightShape::kSphere: {
-      const dvec3 axis = sphere_point({turn_of_set(3 * set + 1), turn_of_set(2 * set + 1)});
-      return light.radius * rotated(sphere_point(st), axis, turn_of_set(set));
+      const dvec3 axis = unit_sphere_point({turn_of_set(3 * set + 1), turn_of_set(2 * set + 1)});
+      return light.radius * rotated(unit_sphere_point(st), axis, turn_of_set(set));
     }
     case LightShape::kEllipsoid: {
-      const dvec3 p = sphere_point(st);
+      const dvec3 p = unit_sphere_point(st);
       return light.axes[0] * p.x + light.axes[1] * p.y + light.axes[2] * p.z;
     }
     default:
@@ -142,8 +146,20 @@ std::uint32_t number_of_sets(const Light& light, const ShadowConfig& config) {
   return config.interleave ? kInterleavedSets : config.sample_sets;
 }
 
+void check_light(const Light& light, const ShadowConfig& config) {
+  check_numbers(config);
+  check_shape(light);
+  if (light.shape == LightShape::kPolygon) make_polygon_light(light);
+}
+
+std::uint32_t samples_of(const Light& light, const ShadowConfig& config) {
+  if (light.shape == LightShape::kSamples) return static_cast<std::uint32_t>(light.points.size());
+  return light.shape == LightShape::kPoint ? 1 : config.light_sample_count;
+}
+
 LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame) {
-  check(light, config);
+  check_numbers(config);
+  check_shape(light);
   LightSamples samples;
   samples.center = frame.to_local(light.center);
   samples.sets = number_of_sets(light, config);
@@ -164,7 +180,7 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
     describe_points(light, frame, samples);
     return samples;
   }
-  samples.count = light.shape == LightShape::kPoint ? 1 : config.light_sample_count;
+  samples.count = samples_of(light, config);
   const bool rotate = config.rotate_sets && (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere);
   const std::vector<dvec2> first =
       unit_square_samples(config.pattern, samples.count, config.frame, rotate ? 1 : samples.sets, config.seed);
@@ -179,6 +195,31 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
   return samples;
 }
 
+std::array<dvec3, 2> light_box(const Light& light) {
+  dvec3 reach(0.0);
+  switch (light.shape) {
+    case LightShape::kPoint:
+      break;
+    case LightShape::kRectangle:
+      reach = (glm::abs(light.u) + glm::abs(light.v)) * 0.5;
+      break;
+    case LightShape::kSamples:
+    case LightShape::kPolygon: {
+      dvec3 low = light.points[0], high = low;
+      for (const dvec3& p : light.points) low = glm::min(low, p), high = glm::max(high, p);
+      return {low, high};
+    }
+    case LightShape::kEllipsoid: {
+      const auto& [a, b, c] = light.axes;  // the norm of each coordinate's row
+      reach = glm::sqrt(a * a + b * b + c * c);
+      break;
+    }
+    default:
+      reach = dvec3(light.radius);
+  }
+  return {light.center - reach, light.center + reach};
+}
+
 std::vector<dvec3> light_extent(const Light& light) {
   switch (light.shape) {
     case LightShape::kPoint:
@@ -190,13 +231,10 @@ std::vector<dvec3> light_extent(const Light& light) {
     case LightShape::kSamples:
     case LightShape::kPolygon:
       return light.points;
-    case LightShape::kEllipsoid: {
-      const auto& [a, b, c] = light.axes;  // the box around |p| = 1: the norm of each coordinate's row
-      const dvec3 reach = glm::sqrt(a * a + b * b + c * c);
-      return {light.center + reach, light.center - reach};
+    default: {
+      const auto [low, high] = light_box(light);
+      return {high, low};
     }
-    default:
-      return {light.center + dvec3(light.radius), light.center - dvec3(light.radius)};
   }
 }
 

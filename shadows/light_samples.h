@@ -30,10 +30,22 @@ struct LightSamples {
 /// Throws Error{kUsage} for counts out of range, Error{kBadInput} for a degenerate light (message names the light).
 LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame);
 
+/// Throws what make_light_samples throws for this light or configuration.
+void check_light(const Light& light, const ShadowConfig& config);
+
+/// 1 for points, their number for explicit samples, else what `config` asks for.
+std::uint32_t samples_of(const Light& light, const ShadowConfig& config);
+
 /// Weights of the samples of every set, [set][sample] (halfshade/emission.h).
 std::vector<vec3> sample_emission(const EmissionImage& image, const LightSamples& samples);
 
+/// Point of the unit sphere, in the axes of the frame, that (s, t) of an ellipsoid's sample stands for.
+dvec3 unit_sphere_point(const dvec2& st);
+
 /// World-space points that the local frame must reach: corners or bounding box of the light.
 std::vector<dvec3> light_extent(const Light& light);
+
+/// Lowest and highest corner of the box around these. `light` has been checked.
+std::array<dvec3, 2> light_box(const Light& light);
 
 }  // namespace halfshade

@@ -2,7 +2,7 @@
 // use.
 #pragma once
 
-#include "halfshade/shadows.h"
+#include "halfshade/names.h"
 
 namespace halfshade {
 
@@ -18,8 +18,5 @@ std::span<const MethodOption> method_options();
 
 /// Does the method read that option? Those named "map." belong to all methods that look into shadow maps.
 bool concerns(const MethodOption& option, ShadowMethod method);
-
-/// `assignment` is "name=value". Throws Error{kUsage}.
-void set_method_option(ShadowConfig& config, const std::string& assignment);
 
 }  // namespace halfshade

@@ -25,7 +25,7 @@ ReceiverRequest make_receiver_request(const LocalFrame& frame, std::span<const R
   q.samples = make_light_samples(light, config, frame);
   for (std::uint32_t i = 0; i < receivers.size(); ++i) {
     const vec3 position = frame.to_lattice(receivers[i].position_world);
-    if (q.samples.one_sided && glm::dot(dvec3(position) - q.samples.center, q.samples.axis_n) <= 0.0) {
+    if (behind_light(position, q.samples)) {
       q.unlit.push_back(i);
     } else {
       const std::uint32_t set =

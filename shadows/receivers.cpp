@@ -21,7 +21,7 @@ ReceiverArray receivers_of_range(const GBuffer& gbuffer, const LightSamples& sam
     if (gbuffer.triangle[i] == kNone) continue;
     const auto entry = static_cast<std::uint32_t>(i);
     const vec3 normal = gbuffer.geometric_normal[i];
-    const vec3 position = snap_to_lattice(gbuffer.position[i] + dvec3(normal) * kReceiverOffset);
+    const vec3 position = lifted_receiver(gbuffer.position[i], normal);
     const std::uint32_t set = set_of_entry(gbuffer, samples, seed, entry);
     if (faces_away(position, normal, samples, set)) continue;
     part.push_back(position, normal, gbuffer.triangle[i], entry, static_cast<std::uint8_t>(set));
@@ -36,6 +36,11 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 
 }  // namespace
 
+void ReceiverArray::resize(std::size_t count) {
+  position.resize(count), normal.resize(count);
+  triangle.resize(count), sample.resize(count), set.resize(count);
+}
+
 void ReceiverArray::push_back(const vec3& p, const vec3& n, std::uint32_t own, std::uint32_t from,
                               std::uint8_t light_set) {
   position.push_back(p);
@@ -46,8 +51,8 @@ void ReceiverArray::push_back(const vec3& p, const vec3& n, std::uint32_t own, s
 }
 
 bool faces_away(const vec3& position, const vec3& normal, const LightSamples& samples, std::uint32_t set) {
+  if (behind_light(position, samples)) return true;
   const dvec3 p(position), n(normal);
-  if (samples.one_sided && glm::dot(p - samples.center, samples.axis_n) <= 0.0) return true;
   for (const vec3& l : samples.set(set)) {
     if (glm::dot(n, dvec3(l) - p) > 0.0) return false;
   }

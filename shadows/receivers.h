@@ -1,6 +1,7 @@
 // The points that ask for light, made once and shared by every method, the oracle and the rivals.
 #pragma once
 
+#include "halfshade/shadow_solver.h"
 #include "rasterizer/core/mesh.h"
 #include "rasterizer/gbuffer.h"
 #include "shadows/light_samples.h"
@@ -16,12 +17,23 @@ struct ReceiverArray {
   std::vector<std::uint8_t> set;        // which set of light samples it uses
 
   std::size_t size() const { return position.size(); }
+  void resize(std::size_t count);
   void push_back(const vec3& p, const vec3& n, std::uint32_t own, std::uint32_t from, std::uint8_t light_set);
 };
 
 /// Distance by which a receiver is lifted off its triangle along the geometric normal: 4 ulp of a coordinate of size 1,
 /// 2^-21 of the scene (stability.md b8).
-inline constexpr double kReceiverOffset = 0x1p-21;
+inline constexpr double kReceiverOffset = kReceiverLift;
+
+/// Lifted and snapped.
+inline vec3 lifted_receiver(const dvec3& position, const vec3& normal) {
+  return snap_to_lattice(position + dvec3(normal) * kReceiverOffset);
+}
+
+/// Does the receiver lie at or behind a one-sided light?
+inline bool behind_light(const vec3& position, const LightSamples& samples) {
+  return samples.one_sided && glm::dot(dvec3(position) - samples.center, samples.axis_n) <= 0.0;
+}
 
 /// Does the light send nothing to this receiver whatever blocks it? True where every sample lies at or below the
 /// receiver's tangent plane, or the receiver lies at or behind a one-sided light. A pure function of rounded inputs.

@@ -1,6 +1,7 @@
 // Chooses the method and runs it on receivers that exist already.
 #pragma once
 
+#include "halfshade/names.h"
 #include "halfshade/shadows.h"
 #include "shadows/receivers.h"
 
@@ -29,11 +30,5 @@ void visibility_of(const VisibilityMasks& masks, std::vector<float>& visibility)
 
 /// Calls config.progress if there is one; throws Error{kCancelled} when it returns false.
 void report_progress(const ShadowConfig& config, double done);
-
-/// "exact", "afsm" ...; throws Error{kUsage} listing the known names.
-ShadowMethod shadow_method_from_name(const std::string& name);
-const char* name_of(ShadowMethod method);
-SamplePattern sample_pattern_from_name(const std::string& name);
-const char* name_of(SamplePattern pattern);
 
 }  // namespace halfshade

@@ -13,7 +13,7 @@ namespace halfshade {
 
 /// Counts of visible samples and of samples asked, one pair per entry: a pixel, a pixel's subsample or a receiver, as
 /// the caller numbers them. Distinct accumulators may be used concurrently, one may not.
-class VisibilityAccumulator {
+class HALFSHADE_API VisibilityAccumulator {
  public:
   explicit VisibilityAccumulator(std::size_t entries = 0) : visible_(entries, 0), total_(entries, 0) {}
   /// Counts that were kept elsewhere. Throws Error{kBadInput} unless both have the same length and visible <= total.
@@ -50,7 +50,7 @@ class VisibilityAccumulator {
 };
 
 /// How far two averages lie apart.
-struct VisibilityError {
+struct HALFSHADE_API VisibilityError {
   double rmse = 0.0, worst = 0.0;  // root of the mean square, and largest, of |visibility a - visibility b|
   std::uint64_t count = 0;         // entries compared
 
@@ -60,12 +60,12 @@ struct VisibilityError {
 
 /// Over those of `entries` that both were asked for, in their order. Throws Error{kUsage} when sizes differ or an entry
 /// is out of range.
-VisibilityError visibility_error(const VisibilityAccumulator& a, const VisibilityAccumulator& b,
-                                 std::span<const std::uint32_t> entries);
+HALFSHADE_API VisibilityError visibility_error(const VisibilityAccumulator& a, const VisibilityAccumulator& b,
+                                               std::span<const std::uint32_t> entries);
 
 /// Sums of colour values over frames in units of 2^-20, so that they do not depend on the order either. For pictures
 /// whose camera moves from frame to frame by fractions of a pixel, where visibility alone cannot be averaged.
-class ColorAccumulator {
+class HALFSHADE_API ColorAccumulator {
  public:
   explicit ColorAccumulator(std::size_t values = 0) : sums_(values, 0) {}
   /// Sums that were kept elsewhere.
@@ -95,6 +95,6 @@ class ColorAccumulator {
 
 /// The exponent p of error = constant * frames^p that fits best (least squares in logarithms; error[i] belongs to
 /// frames[i]; values that are not positive are left out). Random sampling gives -0.5. NaN with fewer than two values.
-double convergence_exponent(std::span<const double> frames, std::span<const double> error);
+HALFSHADE_API double convergence_exponent(std::span<const double> frames, std::span<const double> error);
 
 }  // namespace halfshade

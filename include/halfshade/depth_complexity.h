@@ -6,7 +6,7 @@
 
 namespace halfshade {
 
-struct DepthComplexity {
+struct HALFSHADE_API DepthComplexity {
   std::size_t receiver_count = 0;
   std::uint32_t sample_count = 0;
   std::vector<std::uint32_t> counts;  // [receiver][sample]: triangles crossed at an opaque texel
@@ -24,7 +24,8 @@ struct DepthComplexity {
 /// segments that only touch the outline of an open surface. Opaque triangles with equal corners count once. Receivers
 /// behind a one-sided light get count 1 in every sample. Of `config` the method's own options count for nothing. Errors
 /// and threads as for solve_shadows.
-void solve_depth_complexity(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
-                            const ShadowConfig& config, DepthComplexity& counts, ShadowStats* stats = nullptr);
+HALFSHADE_API void solve_depth_complexity(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                                          const ShadowConfig& config, DepthComplexity& counts,
+                                          ShadowStats* stats = nullptr);
 
 }  // namespace halfshade

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "halfshade/export.h"
+
 namespace halfshade {
 
 enum class ErrorCode {
@@ -15,7 +17,7 @@ enum class ErrorCode {
   kCancelled,  // the caller asked to stop
 };
 
-class Error : public std::runtime_error {
+class HALFSHADE_API Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
   ErrorCode code() const { return code_; }

@@ -5,6 +5,8 @@
 #include <span>
 #include <string>
 
+#include "halfshade/export.h"
+
 namespace halfshade {
 
 enum class ShadowMethod {
@@ -32,8 +34,8 @@ struct MethodTraits {
 };
 
 /// All methods, in the order of the enumeration.
-std::span<const MethodTraits> shadow_methods();
-const MethodTraits& traits_of(ShadowMethod method);
+HALFSHADE_API std::span<const MethodTraits> shadow_methods();
+HALFSHADE_API const MethodTraits& traits_of(ShadowMethod method);
 
 /// Outline of the part of the light view that a blocker can matter to. All hold the region; they differ in how tightly.
 enum class InfluenceOutline {

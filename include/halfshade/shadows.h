@@ -50,7 +50,7 @@ struct ShadowConfig {
 };
 
 /// Blocked masks of all receivers: bit i of a receiver's words is set where light sample i is hidden.
-struct VisibilityMasks {
+struct HALFSHADE_API VisibilityMasks {
   std::size_t receiver_count = 0;
   std::uint32_t sample_count = 0;
   std::size_t words_per_receiver = 0;
@@ -114,12 +114,13 @@ struct Receiver {
 /// sample. Throws Error{kUsage} for a configuration out of range or a method that yields no masks (methods.h),
 /// Error{kBadInput} for positions that are not finite, indices out of range and arrays of the wrong length, naming the
 /// first. Runs in the calling thread's TBB arena. Distinct calls may run concurrently.
-void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
-                   const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats = nullptr);
+HALFSHADE_API void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                                 const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats = nullptr);
 
 /// The fraction of the light that each receiver sees, in [0, 1], by any method; masks are kept nowhere. The same
 /// errors and threads as solve_shadows; receivers behind a one-sided light see nothing.
-void solve_visibility(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
-                      const ShadowConfig& config, std::vector<float>& visibility, ShadowStats* stats = nullptr);
+HALFSHADE_API void solve_visibility(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                                    const ShadowConfig& config, std::vector<float>& visibility,
+                                    ShadowStats* stats = nullptr);
 
 }  // namespace halfshade

@@ -30,8 +30,8 @@ struct StreamOptions {
 /// The scene is read twice, its blockers once more per part of the receivers. Translucent triangles block nothing.
 /// Throws Error{kUsage}, Error{kBadInput} as solve_shadows does, Error{kOutput} when a file cannot be written, and
 /// what the stream throws.
-void solve_shadows(SceneStream& scene, std::span<const Receiver> receivers, const Light& light,
-                   const ShadowConfig& config, const StreamOptions& options, VisibilityMasks& masks,
-                   ShadowStats* stats = nullptr);
+HALFSHADE_API void solve_shadows(SceneStream& scene, std::span<const Receiver> receivers, const Light& light,
+                                 const ShadowConfig& config, const StreamOptions& options, VisibilityMasks& masks,
+                                 ShadowStats* stats = nullptr);
 
 }  // namespace halfshade

@@ -30,7 +30,7 @@ namespace halfshade {
 /// blocked and dimmed ("translucent_triangles_approximated" has their number then).
 ///
 /// Errors and threads as solve_shadows; receivers behind a one-sided light get no light.
-void solve_light(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
-                 const ShadowConfig& config, std::vector<vec3>& reaching, ShadowStats* stats = nullptr);
+HALFSHADE_API void solve_light(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
+                               const ShadowConfig& config, std::vector<vec3>& reaching, ShadowStats* stats = nullptr);
 
 }  // namespace halfshade

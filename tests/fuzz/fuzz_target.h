@@ -26,6 +26,7 @@ void fuzz_view(Bytes input);   // view JSON: what was read is written and read b
 void fuzz_image(Bytes input);  // PNG, JPEG, EXR as texture, opacity and emission
 void fuzz_npy(Bytes input);    // NPY: what was read is written and read back in every bit
 void fuzz_solve(Bytes input);  // small scenes: an exact method against the oracle
+void fuzz_c_api(Bytes input);  // sequences of C calls
 
 /// Ends the process with a message where `holds` is false.
 void require(bool holds, const std::string& what);

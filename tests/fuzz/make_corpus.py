@@ -157,9 +157,18 @@ def solve():
         corpus.add(f"{method}{shape}", bytes(head + body))
 
 
+def c_api():
+    """Bytes as fuzz_c_api.cpp takes them. Numbers above 192 are rare, as they stand for extreme coordinates."""
+    corpus = Corpus("c_api")
+    for number in range(24):
+        draw = random.Random(1000 + number)
+        calls = [draw.randrange(193) if draw.random() < 0.98 else draw.randrange(256) for _ in range(700)]
+        corpus.add(f"calls{number:02}", bytes(calls))
+
+
 def main():
     halfshade = str(pathlib.Path(sys.argv[1]).resolve())
-    obj(), mtl(), view(), npy(), solve()
+    obj(), mtl(), view(), npy(), solve(), c_api()
     with tempfile.TemporaryDirectory() as scratch:
         image(halfshade, pathlib.Path(scratch))
 

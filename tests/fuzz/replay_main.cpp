@@ -23,8 +23,8 @@ struct Target {
   std::string_view name;
   void (*run)(Bytes input);
 };
-constexpr Target kTargets[] = {{"obj", fuzz_obj},     {"mtl", fuzz_mtl}, {"view", fuzz_view},
-                               {"image", fuzz_image}, {"npy", fuzz_npy}, {"solve", fuzz_solve}};
+constexpr Target kTargets[] = {{"obj", fuzz_obj}, {"mtl", fuzz_mtl},     {"view", fuzz_view},  {"image", fuzz_image},
+                               {"npy", fuzz_npy}, {"solve", fuzz_solve}, {"c_api", fuzz_c_api}};
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr double kMostSeconds = 10.0;  // of slower code

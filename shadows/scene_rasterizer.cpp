@@ -1,0 +1,15 @@
+#include "rasterizer/core/parallel.h"
+#include "rasterizer/rasterizer.h"
+#include "shadows/scene_store.h"
+
+namespace halfshade {
+
+void rasterize(const ShadowScene& scene, const Camera& camera, const RasterConfig& config, GBuffer& gbuffer,
+               const Execution& execution) {
+  (void)execution;
+  const FpEnvironment environment;
+  require_committed(scene.impl());
+  rasterize(scene.impl().mesh, camera, config, gbuffer);
+}
+
+}  // namespace halfshade
