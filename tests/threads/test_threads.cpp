@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "halfshade/shadow_solver.h"
 #include "rasterizer/rasterizer.h"
 #include "rasterizer/scenes/builtin.h"
 #include "support/lit_scene.h"
@@ -145,6 +146,111 @@ TEST_CASE("threads: progress is reported on the calling thread; a solve that is 
     reports = 0, allowed = 1 << 30;
     solve_shadows(w.scene, w.receivers, test::frame_light(), config, masks);
     CHECK(masks.words == whole.words);
+  }
+}
+
+/// The loops of a host that has no TBB: threads of its own, made anew for every loop.
+void host_loop(std::size_t count, TaskBody body) {
+  std::atomic<std::size_t> next = 0;
+  const auto run = [&] {
+    for (std::size_t i = next++; i < count; i = next++) body(i);
+  };
+  std::vector<std::thread> helpers;
+  for (std::size_t k = 1; k < std::min<std::size_t>(count, 3); ++k) helpers.emplace_back(run);
+  run();
+  for (std::thread& helper : helpers) helper.join();
+}
+
+Execution host() {
+  Execution execution;
+  execution.executor = Executor::kHost;
+  execution.parallel_for = host_loop;
+  execution.concurrency = 3;
+  return execution;
+}
+
+Execution serial() {
+  Execution execution;
+  execution.executor = Executor::kSerial;
+  return execution;
+}
+
+/// The same work through the embedding interface.
+struct Embedded {
+  ShadowScene scene;
+  std::vector<dvec3> points;
+
+  explicit Embedded(const Execution& execution) {
+    Work w = make_work();
+    MeshView mesh;
+    mesh.positions = w.scene.positions;
+    mesh.triangles = w.scene.triangles;
+    scene.add_mesh(mesh);
+    for (const Receiver& r : w.receivers) points.push_back(r.position_world);
+    scene.extend(points);
+    scene.extend(test::frame_light());
+    scene.commit(execution);
+  }
+
+  std::vector<std::uint64_t> masks(ShadowMethod method, Workspace& workspace, const Execution& execution) const {
+    ShadowConfig config = test::frame_config(64);
+    config.method = method;
+    const ShadowSolver solver(config);
+    std::vector<std::uint64_t> words(points.size() * solver.mask_words(test::frame_light()));
+    ReceiverView receivers;
+    receivers.positions = points;
+    ShadowOutput output;
+    output.masks = words;
+    solver.solve(scene, receivers, test::frame_light(), workspace, output, execution);
+    return words;
+  }
+};
+
+TEST_CASE("host threads: a host's own threads give the bits of a single one") {
+  const Embedded alone(serial()), threaded(host());
+  for (const ShadowMethod method : test::exact_methods()) {
+    CAPTURE(traits_of(method).name);
+    Workspace one, several;
+    const auto expected = alone.masks(method, one, serial());
+    CHECK(threaded.masks(method, several, host()) == expected);
+    CHECK(threaded.masks(method, several, host()) == expected);  // with what the workspace kept
+  }
+}
+
+TEST_CASE("host threads: several threads ask one scene, each with a workspace of its own") {
+  const Embedded embedded(host());
+  const auto& methods = test::exact_methods();
+  std::vector<std::vector<std::uint64_t>> alone, together(methods.size() * 2);
+  for (const ShadowMethod method : methods) {
+    Workspace workspace;
+    alone.push_back(embedded.masks(method, workspace, serial()));
+  }
+  std::vector<std::thread> askers;
+  for (std::size_t i = 0; i < together.size(); ++i) {
+    askers.emplace_back([&, i] {
+      Workspace workspace;
+      together[i] = embedded.masks(methods[i % methods.size()], workspace, i % 2 == 0 ? host() : serial());
+    });
+  }
+  for (std::thread& asker : askers) asker.join();
+  for (std::size_t i = 0; i < together.size(); ++i) CHECK(together[i] == alone[i % methods.size()]);
+}
+
+TEST_CASE("host threads: a call that is stopped leaves scene and workspace usable") {
+  const Embedded embedded(host());
+  for (const ShadowMethod method : test::exact_methods()) {
+    CAPTURE(traits_of(method).name);
+    Workspace workspace, other;
+    Execution stopped = host();
+    int reports = 0;
+    stopped.progress = [&](double) { return ++reports < 2; };
+    try {
+      embedded.masks(method, workspace, stopped);
+      CHECK(reports < 2);  // over before it could be stopped
+    } catch (const Error& error) {
+      CHECK(error.code() == ErrorCode::kCancelled);
+    }
+    CHECK(embedded.masks(method, workspace, host()) == embedded.masks(method, other, serial()));
   }
 }
 
