@@ -59,6 +59,22 @@ TEST_CASE("an OBJ read in pieces of any size has the triangles of the whole file
   }
 }
 
+TEST_CASE("a byte order mark counts at the start of the file alone, wherever a piece starts") {
+  const Scratch scratch;
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const auto file = scratch.write("a.obj", "\xef\xbb\xbf" + triangle +
+                                               "\xef\xbb\xbf"
+                                               "f 1 3 2\nf 2 1 3\n");
+  ObjLoadReport report;
+  CHECK(load_obj(file, {}, report).triangles.size() == 2);
+  for (const std::size_t chunk : {1u, 8u, 1000u}) {
+    SceneStream stream = stream_obj(file, {}, report, chunk);
+    std::size_t count = 0;
+    for (stream.rewind(); stream.next(stream.piece);) count += stream.piece.triangles.size();
+    CHECK(count == 2);
+  }
+}
+
 TEST_CASE("errors in an OBJ read in pieces name the line of the whole file") {
   const Scratch scratch;
   const auto file = scratch.write("a.obj", "v 0 0 0\nv 1 0 0\n\nv 0 1 0\nf 1 2 3\nf 1 2 9\n");
