@@ -235,7 +235,7 @@ class Host {
 
   halfshade_light light() {
     halfshade_light light = HALFSHADE_LIGHT_INIT;
-    light.shape = static_cast<halfshade_light_shape>(in_.below(7) + (in_.broken() ? 7 : 0));
+    light.shape = static_cast<halfshade_light_shape>(in_.broken() ? 7 : in_.below(7));  // 7 is none
     light.two_sided = in_.flag();
     light_points_ = points(5);
     light.points = view_of(light_points_);
@@ -369,7 +369,7 @@ class Host {
     Mesh mesh;
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     halfshade_mesh_desc desc = desc_of(mesh);
-    desc.struct_size = in_.flag() ? in_.below(8) : std::size_t{1} << 40;
+    desc.struct_size = in_.below(8);
     refused(halfshade_scene_add_mesh(context_, scene_, &desc, nullptr));
     halfshade_light lit = HALFSHADE_LIGHT_INIT;
     lit.struct_size = in_.below(8);
