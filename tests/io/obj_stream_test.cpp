@@ -1,3 +1,4 @@
+#include <cfenv>
 #include <string>
 
 #include "rasterizer/io/obj_scene.h"
@@ -73,6 +74,19 @@ TEST_CASE("a byte order mark counts at the start of the file alone, wherever a p
     for (stream.rewind(); stream.next(stream.piece);) count += stream.piece.triangles.size();
     CHECK(count == 2);
   }
+}
+
+TEST_CASE("the caller's rounding mode changes nothing of an OBJ, whole or in pieces") {
+  const Scratch scratch;
+  scratch.write("m.mtl", "newmtl red\nKd 1 0 0\n");
+  const auto file = scratch.write("a.obj", sample_text("\n"));
+  ObjLoadReport report;
+  const Scene whole = load_obj(file, {}, report);
+  std::fesetround(FE_UPWARD);
+  SceneStream stream = stream_obj(file, {}, report, 64);
+  check_equal(whole, stream);
+  CHECK(std::fegetround() == FE_UPWARD);
+  std::fesetround(FE_TONEAREST);
 }
 
 TEST_CASE("errors in an OBJ read in pieces name the line of the whole file") {
