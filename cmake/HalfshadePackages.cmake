@@ -37,6 +37,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/examples/minimal.cpp ${PROJECT_SOURCE_DIR}/e
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME halfshade)
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package has its own
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
@@ -52,32 +53,35 @@ set(CPACK_DEBIAN_PACKAGE_RELEASE ${revision})
 set(CPACK_DEBIAN_PACKAGE_SOURCE halfshade)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR})
 set(full_version ${PROJECT_VERSION}-${revision})
 
-set(about "For every visible point and every sample of an area light halfshade answers\n whether a triangle is in between, with the result of exact arithmetic: the\n same bits for any number of threads and any instruction set.\n .\n")
+set(about "For every visible point and every sample of an area light halfshade answers
+whether a triangle is in between, with the result of exact arithmetic: the
+same bits for any number of threads and any instruction set.
+")
 
 # debian_package(COMPONENT SECTION SYNOPSIS TEXT DEPENDS): what CPack asks of a component.
 macro(debian_package component section synopsis text depends)
   string(TOUPPER ${component} upper)
   set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${package_${component}})
   set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section})
-  set(CPACK_DEBIAN_${upper}_DESCRIPTION "${synopsis}\n${about} ${text}")
+  set(CPACK_DEBIAN_${upper}_DESCRIPTION "${synopsis}\n${about}\n${text}")
   set(CPACK_DEBIAN_${upper}_PACKAGE_DEPENDS "${depends}")
 endmacro()
 
 debian_package(runtime libs "exact soft shadows on the CPU - shared library"
   "This package holds the shared library." "")
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_GENERATE_SHLIBS ON)
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_GENERATE_SHLIBS_POLICY "=")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${debian_dir}/triggers)
 
 debian_package(dev libdevel "exact soft shadows on the CPU - development files"
-  "This package holds the C++ and C headers, the static library, and what CMake\n and pkg-config need to find them."
+  "This package holds the C++ and C headers, the static library, and what CMake\nand pkg-config need to find them."
   "${package_runtime} (= ${full_version}), libglm-dev, libtbb-dev, libhwy-dev")
 
 debian_package(tools graphics "exact soft shadows on the CPU - command line"
-  "This package holds the halfshade command line: it renders, verifies, compares\n and measures." "")
+  "This package holds the halfshade command line: it renders, verifies, compares\nand measures." "")
 
 if(TARGET halfshade_python)
   set(next_minor ${Python3_VERSION_MINOR})

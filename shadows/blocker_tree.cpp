@@ -1,6 +1,7 @@
 #include "shadows/blocker_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "rasterizer/core/parallel.h"
@@ -14,15 +15,7 @@ constexpr std::size_t kParallelFrom = 8192;  // triangles; smaller subtrees are 
 /// Bounds are widened by this much (coordinates are below 4) against rounding of bounds and receivers to float.
 constexpr double kBoundPad = 2e-6;
 
-struct Bounds {
-  vec3 low{1e30f}, high{-1e30f};
-  void add(const vec3& p) { low = glm::min(low, p), high = glm::max(high, p); }
-  void add(const Bounds& b) { low = glm::min(low, b.low), high = glm::max(high, b.high); }
-  float area() const {
-    const vec3 e = high - low;
-    return e.x < 0.0f ? 0.0f : e.x * e.y + e.y * e.z + e.z * e.x;
-  }
-};
+using Bounds = BlockerTree::Bounds;
 
 struct Item {
   Bounds bounds;
@@ -56,6 +49,7 @@ Split find_split(std::span<const Item> items, const Bounds& centers) {
   Split best;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(centers.high[axis] > centers.low[axis])) continue;
+    check_run();
     std::array<Bounds, kBins> bounds;
     std::array<std::size_t, kBins> counts{};
     for (const Item& item : items) {
@@ -88,6 +82,7 @@ std::unique_ptr<Branch> build(std::span<Item> items, std::size_t begin) {
   branch->begin = begin, branch->end = begin + items.size();
   Bounds centers;
   for (const Item& item : items) branch->bounds.add(item.bounds), centers.add(item.center);
+  check_run();
   if (items.size() <= kWidth) return branch;
   const Split split = find_split(items, centers);
   auto middle = items.begin() + static_cast<std::ptrdiff_t>(items.size() / 2);  // all centres equal: halve the run
@@ -126,6 +121,7 @@ std::vector<const Branch*> widen(const Branch& branch) {
 std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   const auto index = static_cast<std::uint32_t>(tree.nodes.size());
   tree.nodes.emplace_back();
+  check_run();
   const std::vector<const Branch*> children = widen(branch);
   tree.nodes[index].count = static_cast<std::uint32_t>(children.size());
   for (std::uint32_t i = 0; i < children.size(); ++i) {
@@ -144,40 +140,72 @@ std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   return index;
 }
 
-void set_lane(const Blocker& b, std::uint32_t lane, BlockerTree::Leaf& leaf) {
+/// What does not depend on a light; lanes beyond the last repeat it.
+void set_lane(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t lane, BlockerTree::Leaf& leaf,
+              std::uint32_t& vertices) {
+  const std::array<vec3, 3> corner = mesh.corners(triangle);
   for (int k = 0; k < 3; ++k) {
-    for (int axis = 0; axis < 3; ++axis) leaf.corner[k][axis][lane] = b.corner[k][axis];
-    leaf.normal[k][lane] = b.normal[k];
+    std::uint32_t v = 0;
+    while (v < vertices && vec3(leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]) != corner[k]) ++v;
+    for (int axis = 0; axis < 3; ++axis) leaf.corner[k][axis][lane] = leaf.vertex[axis][v] = corner[k][axis];
+    leaf.corner_vertex[k][lane] = static_cast<std::uint8_t>(v);
+    vertices = std::max(vertices, v + 1);
   }
-  leaf.side_error[lane] = b.side_error;
-  leaf.triangle[lane] = b.triangle;
+  leaf.triangle[lane] = triangle;
 }
 
-void fill_leaf(const LatticeMesh& mesh, const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
-  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = leaf.perforated = 0;
+void set_edges(std::uint32_t lane, BlockerTree::Leaf& leaf, std::uint32_t& edges) {
+  for (int k = 0; k < 3; ++k) {
+    const std::uint8_t a = leaf.corner_vertex[k][lane], b = leaf.corner_vertex[(k + 1) % 3][lane];
+    std::uint32_t e = 0;
+    const auto is = [&](std::uint8_t from, std::uint8_t to) {
+      return leaf.edge_vertex[0][e] == from && leaf.edge_vertex[1][e] == to;
+    };
+    while (e < edges && !is(a, b) && !is(b, a)) ++e;
+    if (e == edges) leaf.edge_vertex[0][e] = a, leaf.edge_vertex[1][e] = b, ++edges;
+    leaf.corner_edge[k][lane] = static_cast<std::uint8_t>(e | (is(a, b) ? 0 : BlockerTree::kReversed));
+  }
+}
+
+void fill_lanes(const LatticeMesh& mesh, const BlockerTree& tree, BlockerTree::Leaf& leaf) {
+  std::uint32_t vertices = 0, edges = 0;
+  leaf.perforated = 0;
+  for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+    set_lane(mesh, tree.order[leaf.first + std::min(lane, leaf.count - 1)], lane, leaf, vertices);
+    set_edges(lane, leaf, edges);
+    leaf.perforated |= std::uint32_t{lane < leaf.count && mesh.alpha_map(leaf.triangle[lane]) != kNone} << lane;
+  }
+  leaf.vertices = vertices;
+}
+
+void fill_leaf(const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
+  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = 0;
   leaf.box_low = vec3(1e30f), leaf.box_high = vec3(-1e30f);
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     const std::uint32_t place = leaf.first + std::min(lane, leaf.count - 1);  // unused lanes repeat the last triangle
-    if (lane < leaf.count) tree.blockers[place] = make_blocker(mesh, samples, tree.order[place]);
+    if (lane < leaf.count) {
+      std::array<vec3, 3> corners;
+      for (int k = 0; k < 3; ++k)
+        corners[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
+      tree.blockers[place] = make_blocker(corners, (leaf.perforated >> lane) & 1, samples, leaf.triangle[lane]);
+    }
     const Blocker& b = tree.blockers[place];
-    set_lane(b, lane, leaf);
+    for (int k = 0; k < 3; ++k) leaf.normal[k][lane] = b.normal[k];
+    leaf.side_error[lane] = b.side_error;
     leaf.samples_above |= std::uint32_t{b.samples_above} << lane;
     leaf.samples_below |= std::uint32_t{b.samples_below} << lane;
-    leaf.perforated |= std::uint32_t{b.perforated} << lane;
     if (!b.back_faces_only) continue;
     leaf.back_faces_only |= 1u << lane;
     leaf.box_low = glm::min(leaf.box_low, b.box_low), leaf.box_high = glm::max(leaf.box_high, b.box_high);
   }
 }
 
-Bounds leaf_bounds(const LightFrame& frame, const BlockerTree& tree, const BlockerTree::Leaf& leaf) {
+Bounds leaf_bounds(const LightFrame& frame, const BlockerTree::Leaf& leaf) {
   Bounds bounds;
-  for (std::uint32_t i = 0; i < leaf.count; ++i) {
-    for (const vec3& p : tree.blockers[leaf.first + i].corner) {
-      const dvec3 q = frame.to_frame(dvec3(p));
-      bounds.add(vec3(q - kBoundPad));
-      bounds.add(vec3(q + kBoundPad));
-    }
+  for (std::uint32_t v = 0; v < leaf.vertices; ++v) {
+    const dvec3 q = frame.to_frame(dvec3(leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]));
+    bounds.add(vec3(q - kBoundPad));
+    bounds.add(vec3(q + kBoundPad));
   }
   return bounds;
 }
@@ -203,24 +231,37 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
   flatten(*build(items, 0), tree);
   tree.order.reserve(items.size());
   for (const Item& item : items) tree.order.push_back(item.triangle);
+  place_blockers(mesh, tree);
+}
+
+void place_blockers(const LatticeMesh& mesh, BlockerTree& tree) {
+  parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) fill_lanes(mesh, tree, tree.leaves[i]);
+  });
 }
 
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
                         BlockerTree& tree) {
   tree.blockers.resize(tree.order.size());
-  std::vector<Bounds> leaf_box(tree.leaves.size()), node_box(tree.nodes.size());
+  std::vector<Bounds>&leaf_box = tree.leaf_box, &node_box = tree.node_box;
+  leaf_box.resize(tree.leaves.size());
+  node_box.assign(tree.nodes.size(), {});
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      fill_leaf(mesh, samples, tree, tree.leaves[i]);
-      leaf_box[i] = leaf_bounds(frame, tree, tree.leaves[i]);
+      fill_leaf(samples, tree, tree.leaves[i]);
+      leaf_box[i] = leaf_bounds(frame, tree.leaves[i]);
     }
   });
   std::size_t perforated = 0;
-  for (const Blocker& b : tree.blockers) perforated += b.perforated;
+  for (const BlockerTree::Leaf& leaf : tree.leaves)
+    perforated += static_cast<std::size_t>(std::popcount(leaf.perforated));
   tree.alpha.clear();
   tree.alpha.reserve(perforated);  // blockers point into it
-  for (Blocker& b : tree.blockers) {
-    if (b.perforated) b.alpha = &tree.alpha.emplace_back(make_alpha_triangle(mesh, b.triangle));
+  for (const BlockerTree::Leaf& leaf : tree.leaves) {
+    for (std::uint32_t rest = leaf.perforated; rest != 0; rest &= rest - 1) {
+      Blocker& b = tree.blockers[leaf.first + static_cast<std::uint32_t>(std::countr_zero(rest))];
+      b.alpha = &tree.alpha.emplace_back(make_alpha_triangle(mesh, b.triangle));
+    }
   }
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     BlockerTree::Node& node = tree.nodes[n];

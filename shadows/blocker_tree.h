@@ -21,6 +21,7 @@ struct LightFrame {
 struct BlockerTree {
   static constexpr std::uint32_t kWidth = 16;
   static constexpr std::uint32_t kLeafBit = 0x80000000u;
+  static constexpr std::uint8_t kReversed = 0x80;
 
   /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit.
   struct alignas(64) Node {
@@ -30,10 +31,16 @@ struct BlockerTree {
   };
   /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
   struct alignas(64) Leaf {
-    float corner[3][3][kWidth];  // [corner][axis][lane]
+    float corner[3][3][kWidth];               // [corner][axis][lane]
+    float vertex[3][3 * kWidth];              // [axis][vertex]: the corners again, equal ones once
+    std::uint8_t corner_vertex[3][kWidth];    // [corner][lane] -> vertex
+    std::uint8_t edge_vertex[2][3 * kWidth];  // [end][edge] -> vertex; edges between equal vertices once
+    std::uint8_t corner_edge[3][kWidth];      // [corner][lane] -> edge from there to the next; kReversed where it runs
+                                              // against the edge's own direction
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
+    std::uint32_t vertices = 0;
     std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0, perforated = 0;
     vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
   };
@@ -43,11 +50,27 @@ struct BlockerTree {
   std::vector<Blocker> blockers;     // [place in order], for the light of the last refit
   std::vector<AlphaTriangle> alpha;  // of the perforated ones
 
+  /// Scratch of refit_blocker_tree, kept so that refitting again allocates nothing.
+  struct Bounds {
+    vec3 low{1e30f}, high{-1e30f};
+    void add(const vec3& p) { low = glm::min(low, p), high = glm::max(high, p); }
+    void add(const Bounds& b) { low = glm::min(low, b.low), high = glm::max(high, b.high); }
+    float area() const {
+      const vec3 e = high - low;
+      return e.x < 0.0f ? 0.0f : e.x * e.y + e.y * e.z + e.z * e.x;
+    }
+  };
+  std::vector<Bounds> leaf_box, node_box;
+
   std::size_t bytes() const;
 };
 
 /// Order, leaves and topology by binned surface area heuristic. Equal bits for any number of threads.
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);
+
+/// What the leaves hold of the mesh that does not depend on a light, anew: for a mesh that moved since the tree was
+/// built.
+void place_blockers(const LatticeMesh& mesh, BlockerTree& tree);
 
 /// Blockers and bounds for a light.
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,

@@ -1,9 +1,10 @@
 #include "shadows/c_convert.h"
 
+#include <algorithm>
 #include <sstream>
 
-#include "shadows/method_options.h"
-#include "shadows/solver.h"
+#include "halfshade/names.h"
+#include "shadows/view_access.h"
 
 namespace halfshade {
 
@@ -54,18 +55,7 @@ void read_emission_image(const halfshade_light& given, const std::string& name, 
 void read_points(const halfshade_points& points, const std::string& name, std::vector<dvec3>& values) {
   const PointView view = to_view(points, name);
   values.resize(view.count);
-  const std::size_t stride =
-      view.stride_bytes != 0 ? view.stride_bytes : 3 * (view.is_double ? sizeof(double) : sizeof(float));
-  for (std::size_t i = 0; i < view.count; ++i) {
-    const unsigned char* element = static_cast<const unsigned char*>(view.data) + i * stride;
-    if (view.is_double) {
-      std::memcpy(&values[i], element, sizeof(dvec3));
-    } else {
-      vec3 value;
-      std::memcpy(&value, element, sizeof value);
-      values[i] = dvec3(value);
-    }
-  }
+  for (std::size_t i = 0; i < view.count; ++i) values[i] = element(view, i);
 }
 
 }  // namespace
@@ -78,11 +68,11 @@ void check_struct_size(std::size_t struct_size, std::size_t known, const char* n
 
 void check_array(const void* data, std::size_t count, std::size_t stride_bytes, std::size_t element_bytes,
                  std::size_t alignment, const std::string& name) {
-  if (count > kMostInC)
-    throw Error(ErrorCode::kLimit, name + " has " + std::to_string(count) + " elements, allowed are 2^31 - 1");
-  if (stride_bytes > kMostInC)
-    throw Error(ErrorCode::kLimit,
-                name + ": stride of " + std::to_string(stride_bytes) + " bytes, allowed are 2^31 - 1");
+  const auto limit = [&name](const std::string& what) {
+    throw Error(ErrorCode::kLimit, name + what + ", allowed are 2^31 - 1");
+  };
+  if (count > kMostInC) limit(" has " + std::to_string(count) + " elements");
+  if (stride_bytes > kMostInC) limit(": stride of " + std::to_string(stride_bytes) + " bytes");
   if (count == 0) return;
   if (data == nullptr) usage(name + " has " + std::to_string(count) + " elements, but its data is NULL");
   if (stride_bytes != 0 && stride_bytes < element_bytes) {
@@ -123,11 +113,11 @@ UvView to_view(const halfshade_uvs& uvs, const std::string& name) {
 AlphaView to_view(const halfshade_alpha_desc* given) {
   const halfshade_alpha_desc desc = read_struct(given, "alpha map");
   if (desc.data == nullptr) usage("alpha map: data is NULL");
-  const std::size_t texel_bytes = desc.texel_bytes != 0 ? desc.texel_bytes : 1;
-  const std::size_t width_bytes = (desc.width > 0 ? desc.width - 1 : 0) * std::uint64_t{1} * texel_bytes + 1;
-  if (texel_bytes > kMostInC || desc.row_bytes > kMostInC) {
+  if (desc.texel_bytes > kMostInC || desc.row_bytes > kMostInC) {
     throw Error(ErrorCode::kLimit, "alpha map: texels or rows are more than 2^31 - 1 bytes apart");
   }
+  const std::size_t texel_bytes = desc.texel_bytes != 0 ? desc.texel_bytes : 1;
+  const std::uint64_t width_bytes = std::uint64_t{std::max(desc.width, 1u) - 1} * texel_bytes + 1;
   if (desc.row_bytes != 0 && desc.row_bytes < width_bytes) {
     usage("alpha map: rows are " + std::to_string(desc.row_bytes) + " bytes apart, but one has " +
           std::to_string(width_bytes));

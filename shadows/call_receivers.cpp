@@ -121,6 +121,10 @@ void read_receivers(const ShadowScene::Impl& scene, const ReceiverView& view, Ca
 }
 
 void read_receivers(const ShadowScene::Impl& scene, const GBuffer& gbuffer, CallReceivers& receivers) {
+  if (gbuffer.position.size() != gbuffer.size() || gbuffer.geometric_normal.size() != gbuffer.size() ||
+      std::size_t{gbuffer.window.width()} * gbuffer.window.height() != gbuffer.size()) {
+    throw Error(ErrorCode::kBadInput, "receivers: the G-buffer's arrays do not have the size of its window");
+  }
   receivers.resize(gbuffer.size());
   receivers.has_normals = true;
   FirstWrong first_wrong;
@@ -162,6 +166,7 @@ void select_lit(const CallReceivers& receivers, const LightSamples& samples, std
     lit.counts[part] = in_part;
   });
   exclusive_scan(lit.counts, lit.offsets);
+  lit.array.reserve(count);
   lit.array.resize(lit.offsets.back());
   parallel_tasks(parts, [&](std::size_t part) {
     for (std::size_t i = part * kPart; i < end_of(part); ++i) {

@@ -13,10 +13,27 @@
 namespace halfshade {
 namespace {
 
+/// Equal positions get equal numbers.
+std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
+  std::vector<std::uint32_t> order(positions.size()), number(positions.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    const vec3 &p = positions[a], &q = positions[b];
+    return p.x != q.x ? p.x < q.x : (p.y != q.y ? p.y < q.y : p.z < q.z);
+  };
+  parallel_sort(order, before);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
+    number[order[i]] = same ? number[order[i - 1]] : static_cast<std::uint32_t>(i);
+  }
+  return number;
+}
+
 std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<std::uint32_t>& number) {
   std::vector<EdgeUse> uses;
   uses.reserve(mesh.triangles.size() * 3);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (t % 65536 == 0) check_run();
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t a = number[mesh.triangles[t][k]], b = number[mesh.triangles[t][(k + 1) % 3]];
       if (a == b) continue;
@@ -49,24 +66,11 @@ class DisjointSets {
 
 }  // namespace
 
-std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
-  std::vector<std::uint32_t> order(positions.size()), number(positions.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto before = [&](std::uint32_t a, std::uint32_t b) {
-    const vec3 &p = positions[a], &q = positions[b];
-    return p.x != q.x ? p.x < q.x : (p.y != q.y ? p.y < q.y : p.z < q.z);
-  };
-  parallel_sort(order, before);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
-    number[order[i]] = same ? number[order[i - 1]] : static_cast<std::uint32_t>(i);
-  }
-  return number;
-}
-
-ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges) {
+ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges,
+                                        std::vector<std::uint32_t>* welded) {
   const std::size_t count = mesh.triangles.size();
-  std::vector<EdgeUse> uses = collect_edges(mesh, weld(mesh.positions));
+  std::vector<std::uint32_t> number = weld(mesh.positions);
+  std::vector<EdgeUse> uses = collect_edges(mesh, number);
   DisjointSets sets(count);
   for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
     for (const EdgeUse& use : edge) sets.join(edge[0].triangle, use.triangle);
@@ -97,6 +101,7 @@ ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<Edg
     for (const vec3& p : corners) box = {glm::min(box.low, p), glm::max(box.high, p)};
   }
   if (edges != nullptr) *edges = std::move(uses);
+  if (welded != nullptr) *welded = std::move(number);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "rasterizer/core/mesh.h"
+#include "rasterizer/core/run.h"
 #include "shadows/receivers.h"
 #include "shadows/visibility_kernel.h"
 
@@ -32,7 +33,8 @@ struct EdgeUse {
 /// Calls run(uses of one edge) for each edge; `uses` are sorted by edge.
 template <class Run>
 void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
-  while (!uses.empty()) {
+  for (std::size_t runs = 0; !uses.empty(); ++runs) {
+    if (runs % 65536 == 0) check_run();
     std::size_t count = 1;
     while (count < uses.size() && uses[count].edge == uses[0].edge) ++count;
     run(uses.first(count));
@@ -40,12 +42,11 @@ void for_each_edge(std::span<const EdgeUse> uses, const Run& run) {
   }
 }
 
-/// Equal positions get equal numbers, below positions.size().
-std::vector<std::uint32_t> weld(const std::vector<vec3>& positions);
-
 /// Connects triangles across edges whose ends have equal positions. Static for a mesh: build once.
-/// `edges`, if given, gets all uses of edges, sorted.
-ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges = nullptr);
+/// `edges`, if given, gets all uses of edges, sorted; `welded` a number below the count of positions for each position,
+/// equal for equal ones.
+ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<EdgeUse>* edges = nullptr,
+                                        std::vector<std::uint32_t>* welded = nullptr);
 
 /// If the configuration wants it: fills `closed`, lets the kernels use it, and counts the triangles it covers.
 ///

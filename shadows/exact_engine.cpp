@@ -6,25 +6,23 @@
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/alias_free_shadow_map.h"
-#include "shadows/closed_components.h"
-#include "shadows/exact_kernel.h"
 #include "shadows/light_view.h"
-#include "shadows/morton_order.h"
 #include "shadows/solver.h"
 
 namespace halfshade {
 namespace {
 
-constexpr std::size_t kCluster = 64;  // receivers that share a list of leaves
+constexpr std::size_t kCluster = 128;  // receivers that share a list of leaves
 constexpr std::size_t kClustersPerTask = 8;
 
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
 constexpr double kGrazing = 1e-5;
 
 /// Receivers in front of the light on its z > 0 side, in Morton order of their positions, so that runs are compact.
-std::vector<std::uint32_t> order_receivers(const ReceiverArray& receivers, const LightFrame& frame) {
-  return morton_order(receivers.position,
-                      [&](std::uint32_t i) { return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing; });
+void order_receivers(const ReceiverArray& receivers, const LightFrame& frame, ExactWork& work) {
+  morton_order(
+      receivers.position, [&](std::uint32_t i) { return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing; },
+      work.morton, work.order);
 }
 
 /// Bins over the bounding rectangle of all sets.
@@ -83,6 +81,27 @@ SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame&
   return r;
 }
 
+/// The lists of all scratches may become as long as the longest that any had: which cluster meets which scratch changes
+/// with the receivers.
+void even_out(std::vector<ExactScratch>& scratches) {
+  std::size_t leaves = 0, nodes = 0;
+  for (const ExactScratch& s : scratches) {
+    leaves = std::max({leaves, s.leaf.capacity(), s.low[0].capacity(), s.keys.capacity()});
+    nodes = std::max(nodes, s.stack.capacity());
+  }
+  for (ExactScratch& s : scratches) {
+    s.stack.reserve(nodes), s.leaf.reserve(leaves), s.keys.reserve(leaves);
+    for (int k = 0; k < 3; ++k) s.low[k].reserve(leaves), s.high[k].reserve(leaves);
+  }
+}
+
+/// Nothing is left of the light of an earlier call but memory.
+void start_anew(ExactScratch& scratch) {
+  scratch.lines.placed = PictureLines::kNothing;
+  scratch.counters = {};
+  scratch.leaves_listed = scratch.leaves_tested = scratch.clusters_lit = 0;
+}
+
 void add_counters(const std::vector<ExactScratch>& scratches, ShadowStats& stats) {
   KernelCounters total;
   for (const ExactScratch& s : scratches) {
@@ -94,35 +113,64 @@ void add_counters(const std::vector<ExactScratch>& scratches, ShadowStats& stats
   add_to_stats(total, stats);
 }
 
+/// The tree as this side sees it, unless it is so already.
+void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, const LightFrame& frame, ExactSide& side) {
+  if (side.fitted && side.usable == samples.closed_usable) return;
+  side.fitted = false;
+  if (blockers.tree != nullptr && side.tree_version != blockers.tree_version) {
+    side.tree_version = 0;
+    side.tree = *blockers.tree;
+    side.tree_version = blockers.tree_version;
+  }
+  refit_blocker_tree(blockers.mesh, samples, frame, side.tree);
+  side.usable = samples.closed_usable;
+  side.fitted = true;
+}
+
 /// All receivers on one side of the light.
-void solve_side(const LatticeMesh& mesh, const ReceiverArray& receivers, const KernelSamples& samples,
-                const SampleRows& rows, const LightFrame& frame, const ShadowConfig& config, BlockerTree& tree,
+void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, const LightFrame& frame,
+                const ShadowConfig& config, const ExactLight& kept, ExactSide& side, ExactWork& work,
                 VisibilityMasks& masks, ShadowStats& stats) {
   Stopwatch watch;
-  const std::vector<std::uint32_t> order = order_receivers(receivers, frame);
+  order_receivers(receivers, frame, work);
+  const std::vector<std::uint32_t>& order = work.order;
   if (order.empty()) return;
-  KernelReceivers kernel = gather_receivers(receivers, order, masks.words_per_receiver);
+  KernelReceivers& kernel = work.receivers;
+  const KernelSamples& samples = kept.samples;
+  const SampleRows& rows = kept.rows;
+  if (rows.empty()) {
+    gather_receivers(receivers, order, masks.words_per_receiver, kernel);
+  } else {  // bits are in the order of the samples: no masks but the caller's
+    gather_receivers(receivers, order, 0, kernel);
+    kernel.words = masks.words_per_receiver;
+    kernel.mask_at.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
+  }
   stats.index_ms += watch.lap();
-  refit_blocker_tree(mesh, samples, frame, tree);
-  const SampleRectangles rectangles = make_rectangles(samples, frame);
+  fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
-  const ExactScene scene{&tree, &samples, &rectangles, &rows, frame};
-  const auto solve = rows.empty() ? solve_cluster : solve_row_cluster;
+  const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
+  const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 16;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
-  std::vector<ExactScratch> scratches(kTasksPerRound);
+  std::vector<ExactScratch>& scratches = work.scratches;
+  scratches.resize(kTasksPerRound);
+  even_out(scratches);
+  for (ExactScratch& scratch : scratches) start_anew(scratch);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
       const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
       for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
+        check_run();
         solve(scene, begin, std::min(task_end, begin + kCluster), kernel, scratches[t]);
       }
     });
   }
-  scatter_masks(kernel, samples, order, masks);
+  if (rows.empty()) scatter_masks(kernel, samples, order, masks);
   add_counters(scratches, stats);
-  stats.bytes = std::max<std::uint64_t>(stats.bytes, tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
+  stats.bytes =
+      std::max<std::uint64_t>(stats.bytes, side.tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
   stats.test_ms += watch.lap();
 }
 
@@ -148,6 +196,43 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 }  // namespace
 
+void ExactWork::reserve(std::size_t count, std::size_t words) {
+  const std::size_t padded = count + KernelReceivers::kLanePadding;
+  morton.keys.reserve(count), morton.scratch.reserve(count), order.reserve(count);
+  receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
+  receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
+  receivers.masks.reserve(count * words), receivers.mask_at.reserve(count);
+}
+
+void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {
+  kept.unfit();
+  const LightBound bound = make_light_bound(light, samples);
+  kept.front = {dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
+  kept.samples = make_kernel_samples(samples, bound, SampleOrder::kAsGiven);
+  kept.rows = find_sample_rows(samples, kept.samples, kept.front);
+  if (kept.rows.empty()) kept.samples = make_kernel_samples(samples, bound);
+  kept.rectangles = make_rectangles(kept.samples, kept.front);
+}
+
+void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,
+                 const LightSamples& samples, const ShadowConfig& config, ExactLight& kept, ExactWork& work,
+                 VisibilityMasks& masks, ShadowStats& stats) {
+  masks.reset(receivers.size(), samples.count);
+  if (blockers.mesh.triangles.empty()) return;
+  if (blockers.closed != nullptr) {
+    apply_certificates(blockers.mesh, receivers, *blockers.closed, kept.samples, stats);
+  } else {
+    kept.samples.closed = nullptr;
+    kept.samples.closed_usable.clear();
+  }
+  solve_side(blockers, receivers, kept.front, config, kept, kept.sides[0], work, masks, stats);
+  solve_grazing(blockers.mesh, receivers, light, samples, kept.front, config, masks, stats);
+  if (samples.one_sided) return;
+  const LightFrame back{kept.front.origin, kept.front.u, kept.front.v, -kept.front.n};
+  if (blockers.tree == nullptr) std::swap(kept.sides[0].tree, kept.sides[1].tree);
+  solve_side(blockers, receivers, back, config, kept, kept.sides[1], work, masks, stats);
+}
+
 void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
   if (!samples.flat) {
@@ -155,23 +240,15 @@ void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
     return;
   }
   Stopwatch watch;
-  masks.reset(receivers.size(), samples.count);
-  if (mesh.triangles.empty()) return;
-  const LightBound bound = make_light_bound(light, samples);
-  const LightFrame front{dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
-  KernelSamples kernel_samples = make_kernel_samples(samples, bound, SampleOrder::kAsGiven);
-  const SampleRows rows = find_sample_rows(samples, kernel_samples, front);
-  if (rows.empty()) kernel_samples = make_kernel_samples(samples, bound);
+  ExactLight kept;
+  ExactWork work;
   ClosedComponents closed;
-  certify(mesh, receivers, config, closed, kernel_samples, stats);
-  BlockerTree tree;
-  build_blocker_tree(mesh, tree);
+  prepare_exact_light(light, samples, kept);
+  if (config.back_face_casters) closed = find_closed_components(mesh);
+  build_blocker_tree(mesh, kept.sides[0].tree);
   stats.build_ms += watch.lap();
-  solve_side(mesh, receivers, kernel_samples, rows, front, config, tree, masks, stats);
-  solve_grazing(mesh, receivers, light, samples, front, config, masks, stats);
-  if (samples.one_sided) return;
-  const LightFrame back{front.origin, front.u, front.v, -front.n};
-  solve_side(mesh, receivers, kernel_samples, rows, back, config, tree, masks, stats);
+  const ExactBlockers blockers{mesh, config.back_face_casters ? &closed : nullptr};
+  solve_exact(blockers, receivers, light, samples, config, kept, work, masks, stats);
 }
 
 }  // namespace halfshade

@@ -6,10 +6,64 @@
 // light that nothing has blocked yet, and stops when there is none.
 #pragma once
 
-#include "halfshade/shadows.h"
-#include "shadows/receivers.h"
+#include "shadows/closed_components.h"
+#include "shadows/exact_kernel.h"
+#include "shadows/morton_order.h"
 
 namespace halfshade {
+
+/// What blocks, as the engine needs it.
+struct ExactBlockers {
+  const LatticeMesh& mesh;
+  const ClosedComponents* closed = nullptr;  // null: both sides of all triangles cast
+  const BlockerTree* tree = nullptr;         // as built or placed; null: ExactSide::tree is
+  std::uint64_t tree_version = 1;            // changes with the tree; not 0
+};
+
+/// One side of a light and the blockers as it sees them.
+struct ExactSide {
+  BlockerTree tree;
+  bool fitted = false;               // the tree belongs to the light's samples and to the blockers
+  std::vector<std::uint8_t> usable;  // the certificates that the tree was fitted with
+  std::uint64_t tree_version = 0;    // which tree it is a copy of; 0 = none
+};
+
+/// What the engine makes of a light, to be kept from call to call.
+struct ExactLight {
+  LightFrame front;
+  KernelSamples samples;
+  SampleRows rows;              // empty: samples anywhere
+  SampleRectangles rectangles;  // the same from both sides
+  std::array<ExactSide, 2> sides;
+
+  /// The blockers moved.
+  void unfit() { sides[0].fitted = sides[1].fitted = false; }
+  /// The blockers are those of another scene.
+  void forget_blockers() {
+    unfit();
+    sides[0].tree_version = sides[1].tree_version = 0;
+  }
+};
+
+/// Scratch of a call.
+struct ExactWork {
+  MortonScratch morton;
+  std::vector<std::uint32_t> order;
+  KernelReceivers receivers;
+  std::vector<ExactScratch> scratches;
+
+  /// Room for so many receivers with masks of so many words.
+  void reserve(std::size_t count, std::size_t words);
+};
+
+/// For flat lights.
+void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept);
+
+/// Masks of all receivers, exact, by a light that was prepared. Allocates nothing where `work` has room for the
+/// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane.
+void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,
+                 const LightSamples& samples, const ShadowConfig& config, ExactLight& kept, ExactWork& work,
+                 VisibilityMasks& masks, ShadowStats& stats);
 
 /// Masks of all receivers, exact. Flat lights; point, spherical and volumetric lights are handed to the alias-free
 /// shadow map, which gives the same masks.

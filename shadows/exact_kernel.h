@@ -27,8 +27,21 @@ struct ExactScene {
   LightFrame frame;
 };
 
+/// Where the lines of the picture lie, [line][receiver of a packet].
+struct PictureLines {
+  static constexpr std::size_t kLanes = 16;
+  static constexpr std::uint32_t kNothing = 0x100, kMixed = 0x101;
+  alignas(64) float y[SampleRows::kMaxLines][kLanes], offset[SampleRows::kMaxLines][kLanes];
+  alignas(64) float rest[SampleRows::kMaxLines][kLanes];  // 31 - offset; both plus the half that rounds upwards
+  std::uint32_t placed = kNothing;                        // the set of all lanes; see above
+
+  /// For receivers of these sets; lanes beyond `count` are like the last.
+  void place(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
+};
+
 /// Scratch of one thread, and what it counted.
 struct ExactScratch {
+  PictureLines lines;
   std::vector<std::uint32_t> stack, leaf;             // node stack; collected leaves
   std::vector<float> low[3], high[3];                 // their boxes, light frame, padded to full vectors
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
@@ -41,7 +54,7 @@ void solve_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, 
                    ExactScratch& scratch);
 
 /// The same for samples in rows (scene.rows), which must be in sample order.
-void solve_row_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
-                       ExactScratch& scratch);
+void solve_packets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+                   ExactScratch& scratch);
 
 }  // namespace halfshade

@@ -9,6 +9,12 @@ namespace halfshade {
 KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order,
                                  std::size_t words) {
   KernelReceivers k;
+  gather_receivers(receivers, order, words, k);
+  return k;
+}
+
+void gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order, std::size_t words,
+                      KernelReceivers& k) {
   k.count = order.size();
   k.words = words;
   const std::size_t padded = order.size() + KernelReceivers::kLanePadding;
@@ -16,6 +22,7 @@ KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vect
   k.own.assign(padded, kNone), k.open.assign(padded, ~0u);
   k.set.assign(padded, 0);
   k.masks.assign(order.size() * words, 0);
+  k.mask_at.clear();
   parallel_ranges(order.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
       const vec3& p = receivers.position[order[i]];
@@ -24,7 +31,6 @@ KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vect
       k.set[i] = receivers.set[order[i]];
     }
   });
-  return k;
 }
 
 void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const std::vector<std::uint32_t>& order,

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "halfshade/types.h"
-#include "rasterizer/core/parallel.h"
+#include "rasterizer/core/radix_sort.h"
 
 namespace halfshade {
 
@@ -14,27 +14,50 @@ inline std::uint32_t spread_bits(std::uint32_t x) {
   return (x | x << 2) & 0x09249249u;
 }
 
+/// Kept from call to call so that ordering again allocates nothing.
+struct MortonScratch {
+  using Key = std::pair<std::uint32_t, std::uint32_t>;  // code, index
+  std::vector<Key> keys, scratch;
+  RadixCounts counts;
+};
+
 /// Indices of the points for which keep(index) holds, by their place among 1024^3 cells of the box around all points;
 /// within a cell by index.
 template <class Keep>
-std::vector<std::uint32_t> morton_order(std::span<const vec3> points, const Keep& keep) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> keys;
-  keys.reserve(points.size());
+void morton_order(std::span<const vec3> points, const Keep& keep, MortonScratch& scratch,
+                  std::vector<std::uint32_t>& order) {
+  constexpr std::uint32_t kDropped = 1u << 30;  // behind all codes
+  auto& keys = scratch.keys;
+  keys.resize(points.size());
   vec3 low(2.0f), high(-2.0f);
   for (const vec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
   const vec3 scale = 1023.0f / glm::max(high - low, vec3(1e-30f));
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    if (!keep(i)) continue;
-    const vec3 q = (points[i] - low) * scale;
-    const std::uint32_t code = spread_bits(static_cast<std::uint32_t>(q.x)) |
-                               spread_bits(static_cast<std::uint32_t>(q.y)) << 1 |
-                               spread_bits(static_cast<std::uint32_t>(q.z)) << 2;
-    keys.emplace_back(code, i);
+  parallel_ranges(points.size(), 8192, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) {
+      const vec3 q = (points[i] - low) * scale;
+      const auto index = static_cast<std::uint32_t>(i);
+      keys[i] = {!keep(index) ? kDropped
+                              : spread_bits(static_cast<std::uint32_t>(q.x)) |
+                                    spread_bits(static_cast<std::uint32_t>(q.y)) << 1 |
+                                    spread_bits(static_cast<std::uint32_t>(q.z)) << 2,
+                 index};
+    }
+  });
+  const auto code = [](const MortonScratch::Key& key) { return key.first; };
+  parallel_radix_sort(keys, scratch.scratch, kDropped + 1, code, scratch.counts);
+  order.clear();
+  order.reserve(points.size());
+  for (const auto& key : keys) {
+    if (key.first == kDropped) break;
+    order.push_back(key.second);
   }
-  parallel_sort(keys, [](const auto& a, const auto& b) { return a < b; });
+}
+
+template <class Keep>
+std::vector<std::uint32_t> morton_order(std::span<const vec3> points, const Keep& keep) {
+  MortonScratch scratch;
   std::vector<std::uint32_t> order;
-  order.reserve(keys.size());
-  for (const auto& key : keys) order.push_back(key.second);
+  morton_order(points, keep, scratch, order);
   return order;
 }
 

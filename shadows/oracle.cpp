@@ -33,7 +33,7 @@ void block_samples(const LatticeMesh& mesh, std::uint32_t triangle, const vec3& 
 /// but enough to keep all threads busy. Most tests are rejected early, in about a nanosecond.
 std::size_t receivers_per_round(std::size_t tests_per_receiver) {
   constexpr std::size_t kTestsPerThread = 100'000'000;
-  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t threads = concurrency();
   return threads * std::clamp<std::size_t>(kTestsPerThread / std::max<std::size_t>(1, tests_per_receiver), 2, 1024);
 }
 

@@ -41,6 +41,11 @@ void ReceiverArray::resize(std::size_t count) {
   triangle.resize(count), sample.resize(count), set.resize(count);
 }
 
+void ReceiverArray::reserve(std::size_t count) {
+  position.reserve(count), normal.reserve(count);
+  triangle.reserve(count), sample.reserve(count), set.reserve(count);
+}
+
 void ReceiverArray::push_back(const vec3& p, const vec3& n, std::uint32_t own, std::uint32_t from,
                               std::uint8_t light_set) {
   position.push_back(p);

@@ -18,6 +18,7 @@ struct ReceiverArray {
 
   std::size_t size() const { return position.size(); }
   void resize(std::size_t count);
+  void reserve(std::size_t count);
   void push_back(const vec3& p, const vec3& n, std::uint32_t own, std::uint32_t from, std::uint8_t light_set);
 };
 

@@ -33,15 +33,45 @@ void add_row(std::span<const vec3> row, const KernelSamples& samples, const Ligh
   }
 }
 
+/// The lines of a set beyond its first word of columns.
+void add_further_words(SampleRows& rows) {
+  const std::size_t first = rows.y.size() - rows.rows;
+  for (std::uint32_t line = rows.rows; line < rows.lines; ++line) {
+    const std::size_t row = first + line % rows.rows;
+    rows.y.push_back(rows.y[row]);
+    rows.offset.push_back(rows.offset[row] - static_cast<float>(line / rows.rows * SampleRows::kWord));
+  }
+}
+
+/// Bounds of the rows' places from their heights; false where the rows do not rise evenly enough to be worth it.
+bool space_rows(SampleRows& rows, std::uint32_t sets) {
+  const double pitch = rows.rows > 1 ? (double{rows.y[rows.rows - 1]} - double{rows.y[0]}) / (rows.rows - 1.0) : 1.0;
+  if (!(pitch > 1e-7)) return false;
+  double least = 1e30, most = -1e30;
+  for (std::uint32_t set = 0; set < sets; ++set) {
+    for (std::uint32_t row = 0; row < rows.rows; ++row) {
+      const double offset = row - double{rows.y[std::size_t{set} * rows.lines + row]} / pitch;
+      least = std::min(least, offset), most = std::max(most, offset);
+    }
+  }
+  rows.row_scale = static_cast<float>(1.0 / pitch);
+  rows.least_row_offset = static_cast<float>(least), rows.most_row_offset = static_cast<float>(most);
+  if (sets == 1 && most - least < 1e-3) {
+    for (const float y : rows.y) rows.place.push_back(y * rows.row_scale);
+  }
+  return most - least < 2.0;
+}
+
 }  // namespace
 
 SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame) {
   SampleRows rows;
   const std::uint32_t columns = columns_of(light);
   if (columns == 0 || columns > SampleRows::kMaxColumns || light.count / columns > SampleRows::kMaxRows) return rows;
+  const std::uint32_t words = (columns + SampleRows::kWord - 1) / SampleRows::kWord;
   rows.columns = columns;
   rows.rows = light.count / columns;
-  rows.padded = (rows.rows + 15) / 16 * 16;
+  rows.lines = rows.rows * words;
   rows.axis_x = vec3(frame.u), rows.axis_y = vec3(frame.v);
   const dvec3 first = frame.to_frame(dvec3(samples.points[0])),
               last = frame.to_frame(dvec3(samples.points[columns - 1]));
@@ -52,17 +82,21 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
     for (std::uint32_t row = 0; row < rows.rows; ++row) {
       add_row(samples.set_points(set).subspan(row * columns, columns), samples, frame, rows);
     }
-    rows.y.resize(std::size_t{set + 1} * rows.padded, rows.y.back());
-    rows.offset.resize(std::size_t{set + 1} * rows.padded, rows.offset.back());
+    const auto offsets = std::span(rows.offset).last(rows.rows);
+    const auto [least, most] = std::minmax_element(offsets.begin(), offsets.end());
+    rows.least_offset = set == 0 ? *least : std::min(rows.least_offset, *least);
+    rows.most_offset = set == 0 ? *most : std::max(rows.most_offset, *most);
+    add_further_words(rows);
   }
+  if (!space_rows(rows, samples.sets)) return SampleRows();
   for (const vec3& p : samples.points) {
     rows.point_x.push_back(p.x), rows.point_y.push_back(p.y), rows.point_z.push_back(p.z);
   }
   for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(values->size() + 16);
-  rows.valid.assign(rows.padded, 0);
-  std::fill_n(rows.valid.begin(), rows.rows, ~0u >> (32 - columns));
-  const auto [least, most] = std::minmax_element(rows.offset.begin(), rows.offset.end());
-  rows.least_offset = *least, rows.most_offset = *most;
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    const std::uint32_t left = std::min(SampleRows::kWord, columns - line / rows.rows * SampleRows::kWord);
+    rows.valid.push_back(~0u >> (SampleRows::kWord - left));
+  }
   for (const float y : rows.y) rows.reach_y = std::max(rows.reach_y, std::fabs(y));
   // Not a rectangle's rows after all (a skewed light, rows along another axis): the general way is made for those.
   if (rows.deviation * rows.scale > 0.01f) return SampleRows();

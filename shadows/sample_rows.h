@@ -1,5 +1,5 @@
-// Light samples that form rows: the structure that lets one vector hold a whole light (sample i of every row in one
-// lane).
+// Light samples that form rows: the structure that lets a receiver see the light as a picture of a few dozen words, one
+// bit a sample.
 #pragma once
 
 #include "shadows/blocker_tree.h"
@@ -8,24 +8,33 @@ namespace halfshade {
 
 /// The samples of a rectangle as rows of equally spaced columns. In the light's frame (x, y along its edges, lengths of
 /// the lattice) sample i of row j lies at x = (i - offset[j]) / scale, y = y[j], up to `deviation`.
+///
+/// The picture has a word of 32 columns per line. Where a row has more, it takes several lines: line b * rows + j holds
+/// the columns from 32 b on of row j, and `offset` is less by 32 b there.
 struct SampleRows {
-  static constexpr std::uint32_t kMaxColumns = 32, kMaxRows = 32;
-  std::uint32_t rows = 0, columns = 0;
-  std::uint32_t padded = 0;  // rows rounded up to a multiple of 16; the padding holds no samples
+  static constexpr std::uint32_t kWord = 32, kMaxColumns = 64, kMaxRows = 64;
+  static constexpr std::uint32_t kMaxLines = kMaxRows * (kMaxColumns / kWord);
+  std::uint32_t rows = 0, columns = 0, lines = 0;
   vec3 axis_x{1, 0, 0}, axis_y{0, 1, 0};
-  float scale = 1.0f;  // columns per unit of length
-  float least_offset = 0.0f, most_offset = 0.0f;
+  float scale = 1.0f;                             // columns per unit of length
+  float least_offset = 0.0f, most_offset = 0.0f;  // over all rows (not lines)
+  /// Row j lies between (j - most_row_offset) / row_scale and (j - least_row_offset) / row_scale, in all sets.
+  float row_scale = 1.0f, least_row_offset = 0.0f, most_row_offset = 0.0f;
+  /// Line l lies at row place[l] of a picture in which y is row_scale y; rows of a single set that are evenly spaced.
+  std::vector<float> place;
   float reach_y = 0.0f;                          // max |y|
   float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
-  std::vector<float> y, offset;                  // [set][padded]
+  std::vector<float> y, offset;                  // [set][line]
   std::vector<float> point_x, point_y, point_z;  // [set][KernelSamples::padded] the samples themselves, lattice; with
                                                  // room for 16 more to be read
-  std::vector<std::uint32_t> valid;              // [padded]: bits of real samples
+  std::vector<std::uint32_t> valid;              // [line]: bits of real samples
 
   bool empty() const { return rows == 0; }
+  /// First sample of a line, within its set.
+  std::uint32_t first_sample(std::uint32_t line) const { return line % rows * columns + line / rows * kWord; }
 };
 
-/// Empty where the samples have no such rows: other shapes, patterns without rows, more than 32 columns or rows.
+/// Empty where the samples have no such rows: other shapes, patterns without rows, more than 64 columns or rows.
 /// `samples` must be in sample order (make_kernel_samples with SampleOrder::kAsGiven).
 SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame);
 

@@ -92,8 +92,8 @@ MeshCertificate make_certificate(const StoredMesh& mesh, std::span<const vec3> p
   alone.positions.assign(positions.begin(), positions.end());
   alone.triangles = mesh.triangles;
   MeshCertificate result;
-  const std::vector<std::uint32_t> number = weld(alone.positions);
-  ClosedComponents closed = find_closed_components(alone);
+  std::vector<std::uint32_t> number;
+  ClosedComponents closed = find_closed_components(alone, nullptr, &number);
   result.of_triangle = std::move(closed.of_triangle);
   result.parts = static_cast<std::uint32_t>(closed.boxes.size());
   std::vector<std::uint32_t> first(number.size(), kNone);  // [number] -> a vertex that has it
@@ -106,10 +106,9 @@ MeshCertificate make_certificate(const StoredMesh& mesh, std::span<const vec3> p
 
 /// Positions, and whether the mesh is still as closed as it was.
 void update_mesh(StoredMesh& mesh, SceneImpl& scene) {
-  if (!mesh.rounded) {
-    round_mesh(mesh, scene);
-    ++scene.stats.meshes_rounded;
-  }
+  scene.tree_is_placed = false;
+  round_mesh(mesh, scene);
+  ++scene.stats.meshes_rounded;
   const std::span<const vec3> positions(scene.mesh.positions.data() + mesh.first_vertex, mesh.positions.size());
   const bool wanted = scene.config.back_face_casters && mesh.alpha_map == kNone;
   if (wanted && !(mesh.certified && still_welded(mesh, positions))) {
@@ -169,19 +168,21 @@ void update_tree(SceneImpl& scene) {
   Stopwatch watch;
   bool build = !scene.tree_is_current;
   if (!build && scene.config.rebuild_cost > 0.0) {
-    scene.stats.tree_cost =
-        scene.built_cost > 0.0 ? tree_cost(scene.mesh, scene.tree, scene.tree_boxes) / scene.built_cost : 1.0;
+    scene.stats.tree_cost = scene.built_cost > 0.0 ? tree_cost(scene.mesh, scene.tree) / scene.built_cost : 1.0;
     build = scene.stats.tree_cost > scene.config.rebuild_cost;
   }
   if (build) {
-    scene.tree_is_current = false;
+    scene.tree_is_current = scene.tree_is_placed = false;
     build_blocker_tree(scene.mesh, scene.tree);
-    ++scene.tree_version;
-    scene.built_cost = scene.config.rebuild_cost > 0.0 ? tree_cost(scene.mesh, scene.tree, scene.tree_boxes) : 0.0;
+    scene.built_cost = scene.config.rebuild_cost > 0.0 ? tree_cost(scene.mesh, scene.tree) : 0.0;
     scene.tree_is_current = true;
     scene.stats.tree_cost = 1.0;
     ++scene.stats.tree_builds;
+  } else if (!scene.tree_is_placed) {
+    place_blockers(scene.mesh, scene.tree);
   }
+  if (!scene.tree_is_placed) ++scene.tree_version;
+  scene.tree_is_placed = true;
   scene.stats.tree_ms = watch.lap();
 }
 
@@ -214,9 +215,13 @@ void commit_scene(SceneImpl& scene) {
   Stopwatch watch;
   if (!scene.laid_out) lay_out(scene);
   choose_frame(scene);
-  for (StoredMesh& mesh : scene.meshes) {
-    if (!mesh.rounded) update_mesh(mesh, scene);
+  Run& run = *current_run();
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    if (scene.meshes[i].rounded) continue;
+    run.report(0.5 * static_cast<double>(i) / static_cast<double>(scene.meshes.size()));
+    update_mesh(scene.meshes[i], scene);
   }
+  run.report(0.5);
   update_parts(scene);
   update_tree(scene);
   ++scene.version;

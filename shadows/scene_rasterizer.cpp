@@ -6,10 +6,8 @@ namespace halfshade {
 
 void rasterize(const ShadowScene& scene, const Camera& camera, const RasterConfig& config, GBuffer& gbuffer,
                const Execution& execution) {
-  (void)execution;
-  const FpEnvironment environment;
   require_committed(scene.impl());
-  rasterize(scene.impl().mesh, camera, config, gbuffer);
+  run_call(execution, [&] { rasterize(scene.impl().mesh, camera, config, gbuffer); });
 }
 
 }  // namespace halfshade

@@ -46,6 +46,7 @@ struct ShadowScene::Impl {
   bool laid_out = true;           // the arrays below have the meshes in their places
   bool parts_are_current = true;  // `closed` has the closed parts of all meshes
   bool tree_is_current = true;    // `tree` has all triangles
+  bool tree_is_placed = true;     // and where they are
 
   Scene attributes;  // materials, maps, texture coordinates; no positions
   LatticeMesh mesh;  // all meshes, one behind the other
@@ -53,12 +54,10 @@ struct ShadowScene::Impl {
   BlockerTree tree;  // order and topology; boxes belong to lights, and so to workspaces
   double built_cost = 0.0;
 
-  TreeBoxes tree_boxes;
-
   /// Nobody else has this pointer's address as long as anybody keeps it: tells scenes apart.
   std::shared_ptr<const int> identity = std::make_shared<const int>(0);
   std::uint64_t version = 0;       // of what blocks
-  std::uint64_t tree_version = 0;  // of the tree's order
+  std::uint64_t tree_version = 0;  // of the tree
 
   const StoredMesh* find(std::uint32_t id) const;
   StoredMesh& get(std::uint32_t id);  // throws Error{kUsage}

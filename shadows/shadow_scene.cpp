@@ -196,9 +196,7 @@ void ShadowScene::extend(const PointView& points_world) {
 void ShadowScene::extend(const Light& light) { extend(PointView(light_extent(light))); }
 
 void ShadowScene::commit(const Execution& execution) {
-  (void)execution;
-  const FpEnvironment environment;
-  commit_scene(*impl_);
+  run_call(execution, [&] { commit_scene(*impl_); });
 }
 
 bool ShadowScene::committed() const { return impl_->committed; }

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/stopwatch.h"
 #include "shadows/irradiance.h"
 #include "shadows/solver.h"
 #include "shadows/workspace.h"
@@ -57,21 +58,6 @@ void check_output(const Call& call, std::size_t receivers, bool has_normals) {
   }
 }
 
-void check_lights(const Call& call) {
-  for (std::size_t i = 0; i < call.lights.size(); ++i) {
-    const Light& light = call.lights[i];
-    check_light(light, call.config);
-    for (const dvec3& p : light_box(light)) {
-      if (in_reach(call.scene.mesh.frame, p)) continue;
-      throw Error(ErrorCode::kBadInput, "light " + std::to_string(i) + " '" + light.name +
-                                            "' is outside the scene's reach; ShadowScene::extend widens it");
-    }
-    if (light.emission_image.empty() || light.shape == LightShape::kRectangle) continue;
-    throw Error(ErrorCode::kBadInput,
-                "light " + std::to_string(i) + " '" + light.name + "': only rectangles have emission images");
-  }
-}
-
 bool same_geometry(const Light& a, const Light& b) {
   return a.shape == b.shape && a.center == b.center && a.u == b.u && a.v == b.v && a.normal == b.normal &&
          a.radius == b.radius && a.points == b.points && a.two_sided == b.two_sided && a.axes == b.axes;
@@ -86,23 +72,53 @@ bool same_image(const EmissionImage& a, const EmissionImage& b) {
   return a.width == b.width && a.height == b.height && a.rgb == b.rgb;
 }
 
+KeptLight& place_of(const Call& call, std::size_t index) {
+  return call.workspace.lights[index % call.workspace.lights.size()];
+}
+
+SampleKey key_of(const Call& call) {
+  const ShadowConfig& c = call.config;
+  return {c.pattern,  c.light_sample_count, c.sample_sets, c.seed,
+          call.frame, c.interleave,         c.rotate_sets, call.scene.mesh.frame};
+}
+
+/// Are the samples of light `index` there from an earlier call?
+bool is_kept(const Call& call, std::size_t index) {
+  const KeptLight& kept = place_of(call, index);
+  return kept.filled && kept.key == key_of(call) && same_geometry(kept.light, call.lights[index]);
+}
+
+void check_lights(const Call& call) {
+  if (call.frame >= kMaxFrames) {
+    usage("frame: " + std::to_string(call.frame) + " is not below " + std::to_string(kMaxFrames));
+  }
+  for (std::size_t i = 0; i < call.lights.size(); ++i) {
+    const Light& light = call.lights[i];
+    if (!is_kept(call, i)) check_light(light, call.config);
+    for (const dvec3& p : light_box(light)) {
+      if (in_reach(call.scene.mesh.frame, p)) continue;
+      throw Error(ErrorCode::kBadInput, "light " + std::to_string(i) + " '" + light.name +
+                                            "' is outside the scene's reach; ShadowScene::extend widens it");
+    }
+    if (light.emission_image.empty() || light.shape == LightShape::kRectangle) continue;
+    throw Error(ErrorCode::kBadInput,
+                "light " + std::to_string(i) + " '" + light.name + "': only rectangles have emission images");
+  }
+}
+
 /// The samples of a light, from an earlier call where they are the same.
 KeptLight& keep_light(const Call& call, std::size_t index) {
-  KeptLight& kept = call.workspace.lights[index % call.workspace.lights.size()];
-  const Light& light = call.lights[index];
-  const ShadowConfig& c = call.config;
-  const SampleKey key{c.pattern,  c.light_sample_count, c.sample_sets, c.seed,
-                      call.frame, c.interleave,         c.rotate_sets, call.scene.mesh.frame};
-  const bool same = kept.filled && kept.key == key && same_geometry(kept.light, light);
+  KeptLight& kept = place_of(call, index);
+  const bool same = is_kept(call, index);
   if (!same) {
-    kept.filled = false;
-    ShadowConfig config = c;
+    kept.filled = kept.prepared = false;
+    ShadowConfig config = call.config;
     config.frame = call.frame;
-    kept.samples = make_light_samples(light, config, call.scene.mesh.frame);
+    kept.samples = make_light_samples(call.lights[index], config, call.scene.mesh.frame);
     kept.weights.clear();
     kept.image.rgb.clear();
-    kept.key = key;
-    copy_geometry(light, kept.light);
+    kept.key = key_of(call);
+    copy_geometry(call.lights[index], kept.light);
     kept.filled = true;
   }
   ++(same ? call.workspace.stats.lights_kept : call.workspace.stats.lights_made);
@@ -112,6 +128,7 @@ KeptLight& keep_light(const Call& call, std::size_t index) {
 std::span<const vec3> emission_weights(const Light& light, KeptLight& kept) {
   if (light.emission_image.empty()) return {};
   if (kept.weights.empty() || !same_image(light.emission_image, kept.image)) {
+    kept.image.rgb.clear();  // belongs to no weights until both are there
     kept.weights = sample_emission(light.emission_image, kept.samples);
     kept.image = light.emission_image;
   }
@@ -133,11 +150,33 @@ void add_stats(const ShadowStats& light, SolveStats& all) {
   all.bytes = std::max(all.bytes, light.bytes);
 }
 
+/// The engine with what it kept of the light and of the scene.
+void solve_exact_kept(const Call& call, const Light& light, KeptLight& kept, ShadowStats& stats) {
+  const ShadowScene::Impl& scene = call.scene;
+  Workspace::Impl& w = call.workspace;
+  stats.receivers = w.lit.array.size(), stats.triangles = scene.mesh.triangles.size();
+  Stopwatch watch;
+  if (!kept.prepared) prepare_exact_light(light, kept.samples, kept.exact);
+  kept.prepared = true;
+  if (kept.scene != scene.identity) kept.exact.forget_blockers();
+  if (kept.scene_version != scene.version) kept.exact.unfit();
+  kept.scene = scene.identity, kept.scene_version = scene.version;
+  stats.build_ms = watch.lap();
+  const std::size_t words = (kept.samples.count + 63) / 64;
+  w.exact.reserve(w.receivers.size(), words);
+  w.masks.words.reserve(w.receivers.size() * words);
+  const ExactBlockers blockers{scene.mesh, scene.config.back_face_casters ? &scene.closed : nullptr, &scene.tree,
+                               scene.tree_version};
+  solve_exact(blockers, w.lit.array, light, kept.samples, call.config, kept.exact, w.exact, w.masks, stats);
+}
+
 /// Masks, or visibility from methods without masks, of the lit receivers.
-void solve_lit(const Call& call, const Light& light, const KeptLight& kept) {
+void solve_lit(const Call& call, const Light& light, KeptLight& kept) {
   Workspace::Impl& w = call.workspace;
   ShadowStats stats;
-  if (yields_masks(call.config)) {
+  if (call.config.method == ShadowMethod::kExact && kept.samples.flat) {
+    solve_exact_kept(call, light, kept, stats);
+  } else if (yields_masks(call.config)) {
     solve_masks(call.scene.mesh, w.lit.array, light, kept.samples, call.config, w.masks, stats);
   } else {
     solve_visibility(call.scene.mesh, w.lit.array, light, kept.samples, call.config, w.visibility, stats);
@@ -145,7 +184,7 @@ void solve_lit(const Call& call, const Light& light, const KeptLight& kept) {
   add_stats(stats, w.stats);
 }
 
-/// One receiver's results; `at` numbers the light's receivers in the spans.
+/// One receiver's results under one light.
 struct ReceiverResult {
   std::span<const std::uint64_t> mask;  // empty: blocked in every sample, or no masks
   float visibility = 0.0f;
@@ -203,7 +242,9 @@ void run(const Call& call) {
   check_output(call, w.receivers.size(), w.receivers.has_normals);
   check_lights(call);
   std::fill(call.output.total_irradiance.begin(), call.output.total_irradiance.end(), vec3(0.0f));
+  const double lights = static_cast<double>(call.lights.size());
   for (std::size_t i = 0; i < call.lights.size(); ++i) {
+    current_run()->set_part(static_cast<double>(i) / lights, static_cast<double>(i + 1) / lights);
     KeptLight& kept = keep_light(call, i);
     select_lit(w.receivers, kept.samples, call.config.seed, w.lit);
     solve_lit(call, call.lights[i], kept);
@@ -226,27 +267,42 @@ std::size_t ShadowSolver::mask_words(std::span<const Light> lights) const {
   return words;
 }
 
-void ShadowSolver::solve(const ShadowScene& scene, const ReceiverView& receivers, std::span<const Light> lights,
-                         Workspace& workspace, const ShadowOutput& output, const Execution& execution) const {
-  (void)execution;
-  const FpEnvironment environment;
+namespace {
+
+/// The whole call; `read` fills the workspace's receivers.
+template <class Read>
+void run_solve(const ShadowScene& scene, const ShadowConfig& config, std::span<const Light> lights,
+               Workspace& workspace, const ShadowOutput& output, std::size_t words, std::uint32_t frame,
+               const Execution& execution, const Read& read) {
   const Occupied occupied(workspace.impl());
   require_committed(scene.impl());
   workspace.impl().stats = {};
-  read_receivers(scene.impl(), receivers, workspace.impl().receivers);
-  run({scene.impl(), config_, lights, workspace.impl(), output, mask_words(lights),
-       receivers.frame != kNone ? receivers.frame : config_.frame});
+  const auto work = [&] {
+    read(scene.impl(), workspace.impl().receivers);
+    run({scene.impl(), config, lights, workspace.impl(), output, words, frame});
+  };
+  if (execution.progress || !config.progress) {
+    run_call(execution, work);
+  } else {
+    Execution watched = execution;
+    watched.progress = config.progress;
+    run_call(watched, work);
+  }
+}
+
+}  // namespace
+
+void ShadowSolver::solve(const ShadowScene& scene, const ReceiverView& receivers, std::span<const Light> lights,
+                         Workspace& workspace, const ShadowOutput& output, const Execution& execution) const {
+  const std::uint32_t frame = receivers.frame != kNone ? receivers.frame : config_.frame;
+  run_solve(scene, config_, lights, workspace, output, mask_words(lights), frame, execution,
+            [&](const ShadowScene::Impl& from, CallReceivers& to) { read_receivers(from, receivers, to); });
 }
 
 void ShadowSolver::solve(const ShadowScene& scene, const GBuffer& gbuffer, std::span<const Light> lights,
                          Workspace& workspace, const ShadowOutput& output, const Execution& execution) const {
-  (void)execution;
-  const FpEnvironment environment;
-  const Occupied occupied(workspace.impl());
-  require_committed(scene.impl());
-  workspace.impl().stats = {};
-  read_receivers(scene.impl(), gbuffer, workspace.impl().receivers);
-  run({scene.impl(), config_, lights, workspace.impl(), output, mask_words(lights), config_.frame});
+  run_solve(scene, config_, lights, workspace, output, mask_words(lights), config_.frame, execution,
+            [&](const ShadowScene::Impl& from, CallReceivers& to) { read_receivers(from, gbuffer, to); });
 }
 
 }  // namespace halfshade

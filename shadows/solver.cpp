@@ -79,10 +79,26 @@ const char* name_of(ShadowMethod method) { return traits_of(method).name; }
 const char* name_of(SamplePattern pattern) { return kPatterns[static_cast<std::size_t>(pattern)].name; }
 
 void report_progress(const ShadowConfig& config, double done) {
-  if (config.progress && !config.progress(done)) throw Error(ErrorCode::kCancelled, "cancelled");
+  if (Run* run = current_run()) {
+    run->report(done);
+  } else if (config.progress && !config.progress(done)) {
+    throw Error(ErrorCode::kCancelled, "cancelled");
+  }
 }
 
 namespace {
+
+/// body() in the call that is going on, or as a call of its own that config.progress watches.
+template <class Body>
+void in_call(const ShadowConfig& config, const Body& body) {
+  if (current_run() != nullptr) {
+    body();
+    return;
+  }
+  Execution execution;
+  execution.progress = config.progress;
+  run_call(execution, body);
+}
 
 void begin_stats(const OpaqueMesh& opaque, const ReceiverArray& receivers, ShadowStats& stats) {
   stats = {};
@@ -92,11 +108,9 @@ void begin_stats(const OpaqueMesh& opaque, const ReceiverArray& receivers, Shado
   stats.details.emplace_back("translucent_triangles", static_cast<double>(opaque.translucent()));
 }
 
-}  // namespace
-
-void solve_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,
-                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
-  const FpEnvironment environment;
+void dispatch_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,
+                    const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
+                    ShadowStats& stats) {
   const OpaqueMesh opaque(scene_mesh);
   const LatticeMesh& mesh = opaque.get();
   begin_stats(opaque, receivers, stats);
@@ -134,12 +148,9 @@ void solve_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, 
   }
 }
 
-namespace {
-
 void solve_without_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,
                          const LightSamples& samples, const ShadowConfig& config, std::vector<float>& visibility,
                          ShadowStats& stats) {
-  const FpEnvironment environment;
   const OpaqueMesh opaque(scene_mesh);
   const LatticeMesh& mesh = opaque.get();
   begin_stats(opaque, receivers, stats);
@@ -162,6 +173,11 @@ void solve_without_masks(const LatticeMesh& scene_mesh, const ReceiverArray& rec
 }
 
 }  // namespace
+
+void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
+                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
+  in_call(config, [&] { dispatch_masks(mesh, receivers, light, samples, config, masks, stats); });
+}
 
 std::string method_assumptions(const ShadowConfig& config, const Light& light) {
   switch (config.method) {
@@ -193,7 +209,7 @@ void solve_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, c
                       const LightSamples& samples, const ShadowConfig& config, std::vector<float>& visibility,
                       ShadowStats& stats) {
   if (!yields_masks(config)) {
-    solve_without_masks(mesh, receivers, light, samples, config, visibility, stats);
+    in_call(config, [&] { solve_without_masks(mesh, receivers, light, samples, config, visibility, stats); });
     return;
   }
   VisibilityMasks masks;
@@ -225,56 +241,60 @@ Request make_request(const Scene& scene, std::span<const Receiver> receivers, co
 
 void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                    const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats) {
-  const FpEnvironment environment;
-  const Request q = make_request(scene, receivers, light, config);
-  ShadowStats own;
-  VisibilityMasks solved;
-  solve_masks(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
-  spread_masks(q, solved, receivers.size(), masks);
+  in_call(config, [&] {
+    const Request q = make_request(scene, receivers, light, config);
+    ShadowStats own;
+    VisibilityMasks solved;
+    solve_masks(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
+    spread_masks(q, solved, receivers.size(), masks);
+  });
 }
 
 void solve_depth_complexity(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                             const ShadowConfig& config, DepthComplexity& counts, ShadowStats* stats) {
-  const FpEnvironment environment;
-  const Request q = make_request(scene, receivers, light, config);
-  ShadowStats own;
-  DepthComplexity solved;
-  count_depth_complexity(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
-  counts = {receivers.size(), q.samples.count, std::vector<std::uint32_t>(receivers.size() * q.samples.count, 1)};
-  for (std::size_t i = 0; i < q.receivers.size(); ++i) {
-    std::copy_n(solved.counts.begin() + static_cast<std::ptrdiff_t>(i * q.samples.count), q.samples.count,
-                counts.counts.begin() + static_cast<std::ptrdiff_t>(q.receivers.sample[i] * q.samples.count));
-  }
+  in_call(config, [&] {
+    const Request q = make_request(scene, receivers, light, config);
+    ShadowStats own;
+    DepthComplexity solved;
+    count_depth_complexity(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
+    counts = {receivers.size(), q.samples.count, std::vector<std::uint32_t>(receivers.size() * q.samples.count, 1)};
+    for (std::size_t i = 0; i < q.receivers.size(); ++i) {
+      std::copy_n(solved.counts.begin() + static_cast<std::ptrdiff_t>(i * q.samples.count), q.samples.count,
+                  counts.counts.begin() + static_cast<std::ptrdiff_t>(q.receivers.sample[i] * q.samples.count));
+    }
+  });
 }
 
 void solve_visibility(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                       const ShadowConfig& config, std::vector<float>& visibility, ShadowStats* stats) {
-  const FpEnvironment environment;
-  const Request q = make_request(scene, receivers, light, config);
-  ShadowStats own;
-  std::vector<float> solved;
-  solve_visibility(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
-  visibility.assign(receivers.size(), 0.0f);
-  for (std::size_t i = 0; i < solved.size(); ++i) visibility[q.receivers.sample[i]] = solved[i];
+  in_call(config, [&] {
+    const Request q = make_request(scene, receivers, light, config);
+    ShadowStats own;
+    std::vector<float> solved;
+    solve_visibility(q.mesh, q.receivers, light, q.samples, config, solved, stats != nullptr ? *stats : own);
+    visibility.assign(receivers.size(), 0.0f);
+    for (std::size_t i = 0; i < solved.size(); ++i) visibility[q.receivers.sample[i]] = solved[i];
+  });
 }
 
 void solve_light(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                  const ShadowConfig& config, std::vector<vec3>& reaching, ShadowStats* stats) {
-  const FpEnvironment environment;
-  const Request q = make_request(scene, receivers, light, config);
-  ShadowStats own;
-  ShadowStats& noted = stats != nullptr ? *stats : own;
-  VisibilityMasks masks;
-  std::vector<float> visibility;
-  if (yields_masks(config)) {
-    solve_masks(q.mesh, q.receivers, light, q.samples, config, masks, noted);
-  } else {
-    solve_visibility(q.mesh, q.receivers, light, q.samples, config, visibility, noted);
-  }
-  std::vector<vec3> solved;
-  solve_reaching_light(find_panes(q.mesh), q.receivers, light, q.samples, config, masks, visibility, solved, noted);
-  reaching.assign(receivers.size(), vec3(0.0f));
-  for (std::size_t i = 0; i < solved.size(); ++i) reaching[q.receivers.sample[i]] = solved[i];
+  in_call(config, [&] {
+    const Request q = make_request(scene, receivers, light, config);
+    ShadowStats own;
+    ShadowStats& noted = stats != nullptr ? *stats : own;
+    VisibilityMasks masks;
+    std::vector<float> visibility;
+    if (yields_masks(config)) {
+      solve_masks(q.mesh, q.receivers, light, q.samples, config, masks, noted);
+    } else {
+      solve_visibility(q.mesh, q.receivers, light, q.samples, config, visibility, noted);
+    }
+    std::vector<vec3> solved;
+    solve_reaching_light(find_panes(q.mesh), q.receivers, light, q.samples, config, masks, visibility, solved, noted);
+    reaching.assign(receivers.size(), vec3(0.0f));
+    for (std::size_t i = 0; i < solved.size(); ++i) reaching[q.receivers.sample[i]] = solved[i];
+  });
 }
 
 }  // namespace halfshade

@@ -28,7 +28,8 @@ std::string method_assumptions(const ShadowConfig& config, const Light& light);
 /// Of all receivers.
 void visibility_of(const VisibilityMasks& masks, std::vector<float>& visibility);
 
-/// Calls config.progress if there is one; throws Error{kCancelled} when it returns false.
+/// Asks whoever watches the current call, or config.progress outside of any; throws Error{kCancelled} when told to
+/// stop.
 void report_progress(const ShadowConfig& config, double done);
 
 }  // namespace halfshade

@@ -89,6 +89,9 @@ struct ReceiverArray;
 /// Receivers as the kernels read them, in the given order, nothing blocked yet.
 KernelReceivers gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order,
                                  std::size_t words);
+/// The same into what an earlier call filled.
+void gather_receivers(const ReceiverArray& receivers, const std::vector<std::uint32_t>& order, std::size_t words,
+                      KernelReceivers& k);
 /// The finished masks back into the order of the receivers, with samples in their own order.
 void scatter_masks(const KernelReceivers& k, const KernelSamples& samples, const std::vector<std::uint32_t>& order,
                    VisibilityMasks& masks);

@@ -128,9 +128,14 @@ void restore_sample_order(const KernelSamples& samples, std::uint32_t set, std::
 }
 
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle) {
+  return make_blocker(mesh.corners(triangle), mesh.alpha_map(triangle) != kNone, samples, triangle);
+}
+
+Blocker make_blocker(const std::array<vec3, 3>& corners, bool perforated, const KernelSamples& samples,
+                     std::uint32_t triangle) {
   Blocker b;
   b.triangle = triangle;
-  b.corner = mesh.corners(triangle);
+  b.corner = corners;
   for (int k = 0; k < 3; ++k) {
     b.edge[k] = b.corner[(k + 1) % 3] - b.corner[k];
     b.edge_error[k] = kDeterminantError * norm1(b.edge[k]);
@@ -151,7 +156,7 @@ Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std:
     b.back_faces_only = samples.closed_usable[component] != 0;
     b.box_low = samples.closed->boxes[component].low, b.box_high = samples.closed->boxes[component].high;
   }
-  b.perforated = mesh.alpha_map(triangle) != kNone;
+  b.perforated = perforated;
   return b;
 }
 

@@ -30,6 +30,9 @@ struct Blocker {
 };
 
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle);
+/// The same of corners at hand.
+Blocker make_blocker(const std::array<vec3, 3>& corners, bool perforated, const KernelSamples& samples,
+                     std::uint32_t triangle);
 
 /// Settles up to 64 samples of one receiver: `inside` are bits of samples that the blocker's outline certainly covers,
 /// `doubtful` those the float filter left open. Returns the bits of the samples that are blocked.

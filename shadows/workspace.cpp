@@ -9,7 +9,8 @@ std::uint64_t bytes_of(const std::vector<T>& values) {
 }
 
 std::uint64_t bytes_of(const KeptLight& kept) {
-  return bytes_of(kept.samples.points) + bytes_of(kept.samples.st) + bytes_of(kept.image.rgb) + bytes_of(kept.weights);
+  return kept.exact.sides[0].tree.bytes() + kept.exact.sides[1].tree.bytes() + bytes_of(kept.samples.points) +
+         bytes_of(kept.samples.st) + bytes_of(kept.image.rgb) + bytes_of(kept.weights);
 }
 
 std::uint64_t bytes_of(const CallReceivers& r) {
@@ -20,6 +21,12 @@ std::uint64_t bytes_of(const CallReceivers& r) {
 std::uint64_t bytes_of(const LitReceivers& r) {
   return bytes_of(r.array.position) + bytes_of(r.array.normal) + bytes_of(r.array.triangle) + bytes_of(r.array.sample) +
          bytes_of(r.array.set) + bytes_of(r.place) + bytes_of(r.counts) + bytes_of(r.offsets);
+}
+
+std::uint64_t bytes_of(const ExactWork& work) {
+  const KernelReceivers& r = work.receivers;
+  return bytes_of(work.morton.keys) + bytes_of(work.morton.scratch) + bytes_of(work.order) + bytes_of(r.x) +
+         bytes_of(r.y) + bytes_of(r.z) + bytes_of(r.own) + bytes_of(r.open) + bytes_of(r.set) + bytes_of(r.masks);
 }
 
 }  // namespace

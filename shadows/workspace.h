@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "shadows/call_receivers.h"
+#include "shadows/exact_engine.h"
 
 namespace halfshade {
 
@@ -25,6 +26,12 @@ struct KeptLight {
   LightSamples samples;
   EmissionImage image;
   std::vector<vec3> weights;  // of the image, [set][sample]
+
+  // Method exact, flat lights.
+  bool prepared = false;  // `exact` belongs to the samples
+  ExactLight exact;
+  std::shared_ptr<const int> scene;  // identity of the scene that `exact` was fitted to, and its version
+  std::uint64_t scene_version = 0;
 };
 
 struct Workspace::Impl {
@@ -35,6 +42,7 @@ struct Workspace::Impl {
   std::vector<KeptLight> lights;
   CallReceivers receivers;
   LitReceivers lit;
+  ExactWork exact;
   VisibilityMasks masks;          // of the lit receivers
   std::vector<float> visibility;  // the same, from methods without masks
 };

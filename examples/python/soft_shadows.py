@@ -41,8 +41,8 @@ scene.add_mesh(floor, np.array([(0, 1, 2), (0, 2, 3)], np.uint32))
 
 # %%
 lights = [
-    halfshade.Light.rectangle((0, 6, 0), (2, 0, 0), (0, 0, 2), emission=(6, 6, 6)),
-    halfshade.Light.sphere((-5, 2, 3), 0.4, emission=(14, 9, 5)),
+    halfshade.Light.rectangle((0, 6, 0), (2, 0, 0), (0, 0, 2), emission=(16, 16, 16)),
+    halfshade.Light.sphere((-5, 2, 3), 0.4, emission=(60, 40, 20)),
 ]
 for light in lights:
     scene.extend(light)

@@ -1,17 +1,16 @@
 /* halfshade from C: the embedding interface of shadow_scene.h and shadow_solver.h, which say what the calls mean.
  *
  * Status     every function that can fail returns a halfshade_status and writes its outputs only when that is
- *            HALFSHADE_OK. The context keeps the message of its last call, which names the argument at fault.
- * Contexts   say how calls run and keep the message. One thread at a time may use a context; objects belong to none, so
- *            that several threads, each with a context and a workspace of its own, may share a scene and a solver.
- * Structs    that may grow start with struct_size. Begin with the HALFSHADE_..._INIT macro, which sets it and the
- *            defaults. Bytes of a struct that this version of the library does not know must be zero.
- * Arrays     pointer, count, and distance in bytes from one element to the next (0 = packed). Read during the call, not
- *            kept after it. Nothing may count more than 2^31 - 1 elements.
- * Handles    are made by ..._create and freed by ..._destroy, which takes their address and makes them NULL. A NULL
- *            handle, or a handle of another kind, is HALFSHADE_ERROR_USAGE; ..._destroy ignores it.
- * Callbacks  must return: neither longjmp nor a C++ exception may leave them. They must not use the context of the call
- *            that they serve.
+ *            HALFSHADE_OK; a call that was cancelled may have written some of them. The context keeps the message of
+ * its last call, which names the argument at fault. Contexts   say how calls run and keep the message. One thread at a
+ * time may use a context; objects belong to none, so that several threads, each with a context and a workspace of its
+ * own, may share a scene and a solver. Structs    that may grow start with struct_size. Begin with the
+ * HALFSHADE_..._INIT macro, which sets it and the defaults. Bytes of a struct that this version of the library does not
+ * know must be zero. Arrays     pointer, count, and distance in bytes from one element to the next (0 = packed). Read
+ * during the call, not kept after it. Nothing may count more than 2^31 - 1 elements. Handles    are made by ..._create
+ * and freed by ..._destroy, which takes their address and makes them NULL. A NULL handle, or a handle of another kind,
+ * is HALFSHADE_ERROR_USAGE; ..._destroy ignores it. Callbacks  must return: neither longjmp nor a C++ exception may
+ * leave them. They must not use the context of the call that they serve.
  */
 #ifndef HALFSHADE_C_API_H
 #define HALFSHADE_C_API_H

@@ -37,7 +37,8 @@ struct Execution {
 
   /// Called now and then on the calling thread, and on no other, with the share done, 0..1. Returning false stops the
   /// work: the call throws Error{kCancelled}. If it throws, the call throws the same. Either way all objects are as
-  /// usable as before, and what the call would have written is unspecified. May be empty.
+  /// usable as before, and what the call would have written is unspecified. It runs in the floating-point environment
+  /// of the library's own work. May be empty.
   std::function<bool(double done)> progress = nullptr;
 };
 

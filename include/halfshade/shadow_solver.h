@@ -57,10 +57,13 @@ struct WorkspaceConfig {
   std::uint32_t kept_lights = 1;
 };
 
-/// Scratch memory of one call at a time, and what can be kept between calls. After the first calls with the same
-/// scene, number of receivers, and lights that differ only in place, shape parameters and colour, method `exact`
-/// allocates nothing (see ShadowSolver). Distinct Workspaces may be used concurrently; one Workspace may not: a call
-/// that finds it in use throws Error{kUsage}.
+/// Scratch memory of one call at a time, and what can be kept between calls. Method `exact` allocates nothing in a call
+/// that follows others with as many receivers, a scene whose meshes moved but are the same, and flat lights (rectangle,
+/// disk, polygon) whose geometry is the same and that all have a place here. Lists grow to the longest that was needed,
+/// so that the first frames of a movement may still allocate. A light that moves has its samples made anew. Lights that
+/// are not flat, receivers in the plane of a light, and other methods allocate as they need.
+/// Distinct Workspaces may be used concurrently; one Workspace may not: a call that finds it in use throws
+/// Error{kUsage}.
 class HALFSHADE_API Workspace {
  public:
   explicit Workspace(const WorkspaceConfig& config = {});
@@ -91,8 +94,7 @@ class HALFSHADE_API Workspace {
 class HALFSHADE_API ShadowSolver {
  public:
   /// Throws Error{kUsage} for a configuration out of range, and for method raytrace, which is not in the library.
-  /// config.progress is called if the Execution of a call has none; config.back_face_casters counts for nothing (it is
-  /// the scene's).
+  /// config.progress is called if the Execution of a call has none. For method exact, back_face_casters is the scene's.
   explicit ShadowSolver(const ShadowConfig& config = {});
   const ShadowConfig& config() const { return config_; }
 

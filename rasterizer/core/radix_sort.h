@@ -8,14 +8,20 @@
 
 namespace halfshade {
 
+/// Counts of digits, kept so that sorting again allocates nothing.
+struct RadixCounts {
+  std::vector<std::uint32_t> counts, offsets;  // [digit][part]: a part's items come after those of the parts before it
+};
+
 /// Sorts `items` by key(item) < key_end; items of equal keys keep their order, so the result is the same for any number
 /// of threads. `scratch` is resized to match and holds the previous order afterwards.
 template <class Item, class Key>
-void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, std::uint32_t key_end, const Key& key) {
+void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, std::uint32_t key_end, const Key& key,
+                         RadixCounts& kept) {
   constexpr int kDigitBits = 11;
   constexpr std::size_t kDigits = std::size_t{1} << kDigitBits, kPart = 1 << 16;
   const std::size_t parts = (items.size() + kPart - 1) / kPart;
-  std::vector<std::uint32_t> counts, offsets;  // [digit][part]: a part's items come after those of the parts before it
+  auto& [counts, offsets] = kept;
   scratch.resize(items.size());
   for (int shift = 0; shift < 32 && ((key_end - (key_end != 0)) >> shift) != 0; shift += kDigitBits) {
     const auto digit = [&](const Item& item) { return std::size_t{key(item) >> shift} & (kDigits - 1); };
@@ -31,6 +37,12 @@ void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, s
     });
     std::swap(items, scratch);
   }
+}
+
+template <class Item, class Key>
+void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, std::uint32_t key_end, const Key& key) {
+  RadixCounts counts;
+  parallel_radix_sort(items, scratch, key_end, key, counts);
 }
 
 }  // namespace halfshade

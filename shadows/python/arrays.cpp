@@ -176,12 +176,15 @@ Result<Value> result_of(const py::object& wanted, const std::vector<py::ssize_t>
   if (wanted.ptr() == Py_True) return result_over<Value>(py::array_t<Value>(shape));
   if (!py::isinstance<py::array>(wanted)) usage(std::string(name) + ": expected True, False or an array");
   const auto array = py::reinterpret_borrow<py::array>(wanted);
-  const std::string expected = py::str(py::tuple(py::cast(shape)));
   bool same_shape = array.ndim() == static_cast<py::ssize_t>(shape.size());
   for (std::size_t k = 0; same_shape && k < shape.size(); ++k) {
     same_shape = array.shape(static_cast<py::ssize_t>(k)) == shape[k];
   }
-  if (!same_shape) usage(std::string(name) + ": shape " + shape_of(array) + ", expected " + expected);
+  if (!same_shape) {
+    std::string expected;
+    for (const py::ssize_t length : shape) expected += (expected.empty() ? "" : ", ") + std::to_string(length);
+    usage(std::string(name) + ": shape " + shape_of(array) + ", expected (" + expected + ")");
+  }
   if (!py::isinstance<py::array_t<Value>>(array)) {
     usage(std::string(name) + ": elements are " + std::string(py::str(array.dtype())) + ", expected " +
           std::string(py::str(py::dtype::of<Value>())));

@@ -346,7 +346,7 @@ ShadowSolver make_solver(const std::string& method, std::uint32_t light_sample_c
   config.rotate_sets = rotate_sets;
   for (const auto& [name, value] : options) {
     std::string text = py::str(value);
-    if (py::isinstance<py::bool_>(value)) text = value.cast<bool>() ? "1" : "0";
+    if (py::isinstance<py::bool_>(value)) text = value.cast<bool>() ? "on" : "off";
     set_method_option(config, std::string(py::str(name)) + "=" + text);
   }
   return ShadowSolver(config);

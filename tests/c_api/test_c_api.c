@@ -133,7 +133,7 @@ static void meshes_move_and_go(void) {
   const double moved[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
   double aside[12];
   memcpy(aside, moved, sizeof aside);
-  aside[3] = -16; /* the edge is at x = -16 then */
+  aside[3] = -8; /* the edge is at x = -8 then */
   CHECK_OK(halfshade_scene_set_transform(f.context, f.scene, f.mesh, aside));
   CHECK_FAILS(solve(&f), HALFSHADE_ERROR_USAGE, "commit");
   CHECK_OK(halfshade_scene_commit(f.context, f.scene));
@@ -218,9 +218,18 @@ static void loops_run_where_the_host_says(void) {
   desc.parallel_for_user = &calls;
   desc.concurrency = 2;
   set_up(&f, &desc);
+  enum { MANY = 20000 };
+  static double points[MANY][3];
+  static float visibility[MANY];
+  for (int i = 0; i < MANY; ++i) points[i][0] = i % 2 == 0 ? -32 : 32;
+  f.receivers.positions = doubles(points, MANY);
+  f.output.visibility = visibility;
+  f.output.visibility_count = MANY;
+  f.output.masks = NULL;
+  f.output.mask_count = 0;
   CHECK_OK(solve(&f));
   CHECK(calls > 0);
-  CHECK(f.visibility[0] == 0.0f && f.visibility[1] == 0.5f && f.visibility[2] == 1.0f);
+  for (int i = 0; i < MANY; ++i) CHECK(visibility[i] == (float)(i % 2));
   tear_down(&f);
 
   desc.executor = HALFSHADE_EXECUTOR_SERIAL;

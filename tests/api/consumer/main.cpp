@@ -21,6 +21,15 @@ int main() {
   config.pattern = halfshade::SamplePattern::kUniform;
   halfshade::solve_shadows(scene, {&receiver, 1}, light, config, masks);
 
+  // An error of the library is an error here: its type is known on both sides.
+  bool refused = false;
+  try {
+    config.light_sample_count = 0;
+    halfshade::solve_shadows(scene, {&receiver, 1}, light, config, masks);
+  } catch (const halfshade::Error& error) {
+    refused = error.code() == halfshade::ErrorCode::kUsage;
+  }
+
   std::printf("visibility %.4f, expected 0.5\n", static_cast<double>(masks.visibility(0)));
-  return masks.visibility(0) == 0.5f ? 0 : 1;
+  return masks.visibility(0) == 0.5f && refused ? 0 : 1;
 }

@@ -1,0 +1,194 @@
+// Stability case S43: a call that is stopped, by its callback or by memory that ran out, leaves everything usable.
+#include <doctest/doctest.h>
+
+#include <ctime>
+
+#include "support/counted_new.h"
+#include "support/embed_scene.h"
+#include "support/host_loop.h"
+
+using namespace halfshade;
+using namespace halfshade::test;
+
+namespace {
+
+/// What a host throws from its callback.
+struct HostSays {
+  int tick;
+};
+
+double cpu_ms() { return 1000.0 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// Asks `call` to stop at a tick, by returning false or by throwing. How it ended: 0 = was done before, 1 = stopped.
+/// `latency` gets the processor time, of all threads, from the callback's answer to the end of the call.
+template <class Call>
+int stop_at(int tick, bool by_throwing, Executor executor, const Call& call, double& latency) {
+  Execution execution = executor == Executor::kHost ? host_execution() : Execution{executor};
+  int ticks = 0, answers = 0;
+  double asked = 0.0;
+  execution.progress = [&](double) {
+    if (ticks++ < tick) return true;
+    ++answers;
+    asked = cpu_ms();
+    if (by_throwing) throw HostSays{tick};
+    return false;
+  };
+  int stopped = 0;
+  try {
+    call(execution);
+  } catch (const HostSays& says) {
+    stopped = by_throwing && says.tick == tick ? 1 : 2;
+  } catch (const Error& error) {
+    stopped = !by_throwing && error.code() == ErrorCode::kCancelled ? 1 : 2;
+  }
+  CHECK(answers == (stopped != 0 ? 1 : 0));
+  latency = stopped != 0 ? cpu_ms() - asked : 0.0;
+  return stopped;
+}
+
+/// Ticks of a whole run.
+template <class Call>
+int ticks_of(const Call& call) {
+  int ticks = 0;
+  Execution execution;
+  execution.progress = [&](double) { return ++ticks > 0; };
+  call(execution);
+  return ticks;
+}
+
+/// Stops first commits and solves of a scene of about `rings`^2 * 8 triangles at `stops` random ticks each.
+void stop_at_random(std::uint32_t rings, std::uint32_t side, int stops) {
+  const Ground ground(side);
+  const Light light = frame_light();
+  const ShadowSolver solver({.light_sample_count = 64});
+  const OwnedMesh large = ball({0.0, 1.2, 0.0}, 0.9, rings), small = ball({0, 0, 0}, 0.3, 8);
+  const auto make = [&] {
+    ShadowScene scene;
+    scene.extend(light);
+    scene.extend(PointView(ground.positions));
+    scene.add_mesh(large.view());
+    scene.add_mesh(small.view());
+    return scene;
+  };
+  ShadowScene whole = make();
+  const int commit_ticks = ticks_of([&](const Execution& e) { whole.commit(e); });
+  Workspace workspace;
+  Solved expected;
+  const int solve_ticks = ticks_of([&](const Execution& e) {
+    expected = solve(solver, whole, ground.view(), {&light, 1}, workspace, e);
+  });
+  REQUIRE(blocked_bits(expected.masks) > 1000);
+  constexpr Executor kExecutors[] = {Executor::kArena, Executor::kSerial, Executor::kHost};
+  Random random(43);
+  int stopped_commits = 0, stopped_solves = 0;
+  double worst = 0.0;
+  for (int i = 0; i < stops; ++i) {
+    CAPTURE(i);
+    const Executor executor = kExecutors[i % 3];
+    double latency = 0.0;
+    ShadowScene scene = make();
+    const int tick = static_cast<int>(random.uniform(0.0, commit_ticks));
+    const int how = stop_at(
+        tick, i % 2 == 0, executor, [&](const Execution& e) { scene.commit(e); }, latency);
+    CHECK(how < 2);
+    CHECK(scene.committed() == (how == 0));
+    stopped_commits += how, worst = std::max(worst, latency);
+    scene.commit();
+    Workspace fresh;
+    const int at = static_cast<int>(random.uniform(0.0, solve_ticks));
+    const int end = stop_at(
+        at, i % 4 < 2, executor,
+        [&](const Execution& e) {
+          solve(solver, scene, ground.view(), {&light, 1}, fresh, e);
+        },
+        latency);
+    CHECK(end < 2);
+    stopped_solves += end, worst = std::max(worst, latency);
+    CHECK(solve(solver, scene, ground.view(), {&light, 1}, fresh).masks == expected.masks);
+    CHECK(solve(solver, whole, ground.view(), {&light, 1}, workspace).masks == expected.masks);
+  }
+  MESSAGE("ticks: commit ", commit_ticks, ", solve ", solve_ticks, "; stopped: ", stopped_commits, ", ", stopped_solves,
+          "; worst: ", worst, " ms of processor time");
+  CHECK(stopped_commits > stops / 4);
+  CHECK(stopped_solves > stops / 4);
+  CHECK(worst <= 100.0);
+}
+
+}  // namespace
+
+TEST_CASE("S43: stopped at random ticks, by false or by an exception") { stop_at_random(40, 48, 100); }
+
+TEST_CASE("S43_long: the same in a scene of a million triangles") { stop_at_random(500, 128, 100); }
+
+TEST_CASE("S43: memory runs out at each of the first 500 allocations") {
+  const Ground ground(24);
+  const std::vector<Light> lights = {frame_light(), frame_light()};
+  const ShadowSolver solver({.light_sample_count = 64, .sample_sets = 2});
+  const OwnedMesh first = ball({0.3, 1.0, 0.0}, 0.5, 6), second = ball({-0.5, 1.2, 0.3}, 0.4, 5);
+  std::vector<std::uint64_t> masks(ground.positions.size() * lights.size());
+  std::vector<float> visibility(masks.size());
+  const ShadowOutput output{.masks = masks, .visibility = visibility};
+
+  // From the first mesh to the masks; what is finished is not done again.
+  struct Host {
+    ShadowScene scene;
+    Workspace workspace;
+    int done = 0;
+  };
+  const auto advance = [&](Host& host, const Execution& execution) {
+    const std::array<std::function<void()>, 8> steps = {
+        [&] { host.scene.extend(lights[0]); },
+        [&] { host.scene.extend(PointView(ground.positions)); },
+        [&] { host.scene.add_mesh(first.view()); },
+        [&] { host.scene.add_mesh(second.view()); },
+        [&] { host.scene.commit(execution); },
+        [&] { solver.solve(host.scene, ground.view(), lights, host.workspace, output, execution); },
+        [&] {
+          host.scene.set_transform(1, moved_by({0.1, 0.2, 0.0}));
+          host.scene.commit(execution);
+        },
+        [&] { solver.solve(host.scene, ground.view(), lights, host.workspace, output, execution); }};
+    for (; host.done < static_cast<int>(steps.size()); ++host.done) steps[static_cast<std::size_t>(host.done)]();
+  };
+  for (const Executor executor : {Executor::kSerial, Executor::kArena}) {
+    const Execution execution{executor};
+    std::vector<std::uint64_t> expected;
+    {
+      Host host;
+      advance(host, execution);
+      expected = masks;
+    }
+    REQUIRE(blocked_bits(expected) > 1000);
+    int failures = 0;
+    for (std::uint64_t n = 1; n <= 500; ++n) {
+      CAPTURE(n);
+      masks.assign(masks.size(), 0);
+      const std::int64_t before = allocations_now().live;
+      bool equal = false;
+      std::string other;
+      {
+        std::optional<Host> host;
+        fail_allocation(n);
+        for (int attempt = 0; attempt < 2; ++attempt) {
+          try {
+            if (!host) host.emplace();
+            advance(*host, execution);
+            break;
+          } catch (const std::bad_alloc&) {
+            failures += attempt == 0;
+            if (attempt == 1) other = "a second failure";
+          } catch (const std::exception& error) {
+            other = error.what();
+          }
+        }
+        fail_allocation(0);
+        equal = host.has_value() && host->done == 8 && masks == expected;
+      }
+      CHECK(equal);
+      CHECK(other == "");
+      if (executor == Executor::kSerial) CHECK(allocations_now().live == before);
+    }
+    MESSAGE(failures, " of 500 failed");
+    CHECK(failures > 100);
+  }
+}
