@@ -6,6 +6,9 @@ namespace halfshade {
 
 std::vector<dvec3> receiver_reach(std::span<const Receiver> receivers, const Light& light) {
   std::vector<dvec3> reach = light_extent(light);
+  if (!std::all_of(reach.begin(), reach.end(), is_finite)) {
+    throw Error(ErrorCode::kBadInput, "light '" + light.name + "': a coordinate or the extent is not finite");
+  }
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     if (!is_finite(receivers[i].position_world)) {
       throw Error(ErrorCode::kBadInput, "receiver " + std::to_string(i) + ": the position is not finite");

@@ -10,6 +10,7 @@
 #include "shadows/oracle.h"
 #include "shadows/percentage_closer.h"
 #include "shadows/receiver_request.h"
+#include "shadows/scene_check.h"
 #include "shadows/shadow_accumulation.h"
 #include "shadows/shadow_map.h"
 #include "shadows/shadow_map_per_sample.h"
@@ -230,6 +231,8 @@ struct Request : ReceiverRequest {
 
 Request make_request(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                      const ShadowConfig& config) {
+  check_scene(scene);
+  check_own_triangles(receivers, scene.triangles.size());
   const LocalFrame frame = make_local_frame(scene.positions, receiver_reach(receivers, light));
   return {make_receiver_request(frame, receivers, light, config), make_lattice_mesh(scene, frame)};
 }

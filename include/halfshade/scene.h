@@ -42,7 +42,7 @@ struct Material {
   }
 };
 
-/// Indexed triangles. Positions are finite; indices are in range (the loaders check, Scene does not).
+/// Indexed triangles. Positions are finite; indices are in range (the loaders and solves check, Scene does not).
 struct Scene {
   std::string name;                                     // for messages
   std::vector<dvec3> positions;                         // world space

@@ -115,9 +115,9 @@ struct Receiver {
 /// Answers `blocks(triangle, receiver, sample)` for every receiver and every sample of `light`; masks in receiver
 /// order. Positions are rounded to the lattice of the scene's local frame first (docs/decisions/0001); the answer is
 /// the one of exact arithmetic on the rounded points. Receivers behind a one-sided light are marked blocked in every
-/// sample. Throws Error{kUsage} for a configuration out of range
-/// or a method that yields no masks (methods.h), Error{kBadInput} for non-finite positions. Runs in
-/// the calling thread's TBB arena. Distinct calls may run concurrently.
+/// sample. Throws Error{kUsage} for a configuration out of range or a method that yields no masks (methods.h),
+/// Error{kBadInput} for positions that are not finite, indices out of range and arrays of the wrong length, naming the
+/// first. Runs in the calling thread's TBB arena. Distinct calls may run concurrently.
 HALFSHADE_API void solve_shadows(const Scene& scene, std::span<const Receiver> receivers, const Light& light,
                                  const ShadowConfig& config, VisibilityMasks& masks, ShadowStats* stats = nullptr);
 

@@ -33,7 +33,8 @@ LocalFrame make_local_frame(std::span<const dvec3> geometry, std::span<const dve
   if (reach > 0.0) {
     int exponent = 0;
     if (std::frexp(reach, &exponent) == 0.5) --exponent;  // an exact power of two fills the frame
-    frame.scale = std::ldexp(1.0, -exponent);
+    // Below 2^-1023 the scene no longer fills the frame: the scale would not be a number.
+    frame.scale = std::ldexp(1.0, std::min(-exponent, 1023));
   }
   return frame;
 }

@@ -77,6 +77,18 @@ bool is_whole_png(std::string_view bytes) {
   return false;
 }
 
+// A block of 8 x 8 samples takes at least one bit, so a few bytes that claim a gigabyte are known for what they are:
+// libjpeg would fill it with grey. `frame` is a start-of-frame segment behind its length.
+bool is_credible_jpeg_frame(std::string_view frame, std::size_t file_bytes) {
+  constexpr std::uint64_t kMostExpansion = 1024;  // pixels per byte, twice what the above allows
+  if (frame.size() < 5) return false;
+  return std::uint64_t{big_endian(frame, 1, 2)} * big_endian(frame, 3, 2) <= file_bytes * kMostExpansion;
+}
+
+bool is_frame_marker(std::uint32_t marker) {  // but for the tables that share its range
+  return marker >= 0xffc0 && marker <= 0xffcf && marker != 0xffc4 && marker != 0xffc8 && marker != 0xffcc;
+}
+
 // Walks the segments to the end-of-image marker: libjpeg fills what is missing with grey and only warns.
 bool is_whole_jpeg(std::string_view bytes) {
   std::size_t at = 2;
@@ -88,6 +100,7 @@ bool is_whole_jpeg(std::string_view bytes) {
       continue;
     }  // padding
     if (marker < 0xff01 || at + 4 > bytes.size()) return false;
+    if (is_frame_marker(marker) && !is_credible_jpeg_frame(bytes.substr(at + 4), bytes.size())) return false;
     at += 2 + std::size_t{big_endian(bytes, at + 2, 2)};
     if (marker != 0xffda) continue;
     // Entropy-coded data: up to a marker that is neither a stuffed zero nor a restart.

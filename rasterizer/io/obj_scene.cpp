@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <unordered_map>
+#include <unordered_set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -133,9 +134,7 @@ class ObjLoader {
 
   void add_missing(const char* kind, const std::string& name) {
     std::string what = fmt::format("{} {}", kind, in_quotes(name));
-    if (std::find(report_.missing.begin(), report_.missing.end(), what) == report_.missing.end()) {
-      report_.missing.push_back(std::move(what));
-    }
+    if (known_missing_.insert(what).second) report_.missing.push_back(std::move(what));
   }
 
   void report_missing() {
@@ -154,6 +153,7 @@ class ObjLoader {
   std::vector<fs::path> libraries_;
   std::vector<MaterialMaps> maps_;  // [material]
   std::unordered_map<std::string, std::uint32_t> material_numbers_;
+  std::unordered_set<std::string> known_missing_;  // what report_.missing has
 };
 
 void fill_report(ObjGeometry& geometry, ObjLoadReport& report) {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "halfshade/error.h"
+#include "rasterizer/core/parallel.h"
 #include "rasterizer/io/input_file.h"
 #include "rasterizer/io/obj_parser.h"
 
@@ -62,6 +63,7 @@ class Reading {
 
   /// The triangles of the next chunk that has any.
   bool next() {
+    const FpEnvironment environment;
     parser_.drop_triangles();
     std::string_view lines;
     while (parser_.geometry().triangles.empty()) {

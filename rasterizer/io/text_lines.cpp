@@ -20,7 +20,7 @@ bool is_comment(std::string_view line) {
 
 TextLines::TextLines(std::string_view text, std::string name, std::uint64_t lines_before)
     : rest_(text), name_(std::move(name)), number_(lines_before), ended_(lines_before) {
-  if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
+  if (lines_before == 0 && rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
   const std::size_t zero = text.find('\0');
   if (zero == std::string_view::npos) return;
   number_ +=

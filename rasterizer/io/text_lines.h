@@ -9,8 +9,8 @@
 
 namespace halfshade {
 
-/// Walks the lines of a text. Ends are \n, \r\n or \r; a byte order mark is dropped; a line that ends in a backslash is
-/// joined with the next one, except comments (exporters write Windows paths there).
+/// Walks the lines of a text. Ends are \n, \r\n or \r; a byte order mark of the file is dropped; a line that ends in a
+/// backslash is joined with the next one, except comments (exporters write Windows paths there).
 class TextLines {
  public:
   static constexpr std::size_t kLongestLine = std::size_t{1} << 20;  // bytes

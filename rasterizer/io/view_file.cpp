@@ -20,6 +20,7 @@ using nlohmann::ordered_json;
 
 constexpr std::size_t kMostSamples = 4096;
 constexpr std::size_t kMostCorners = 64;  // of a polygon; that it is flat and convex is checked where it is used
+constexpr int kDeepest = 32;  // arrays and objects inside each other; the format needs 5, and messages recurse
 constexpr std::uint64_t kMostFileBytes = std::uint64_t{16} << 20;
 constexpr const char* kShapeNames[] = {"point",   "rectangle", "disk",    "sphere",
                                        "samples", "ellipsoid", "polygon", "sun"};  // by LightShape
@@ -284,9 +285,13 @@ ordered_json to_object(const Light& light) {
 
 View load_view(const std::filesystem::path& file) {
   const std::string text = read_regular_file(file, kMostFileBytes);
+  const auto check_depth = [&](int depth, json::parse_event_t, const json&) {
+    if (depth <= kDeepest) return true;
+    throw Error(ErrorCode::kBadInput, fmt::format("{}: nested more than {} deep", file.string(), kDeepest));
+  };
   json document;
   try {
-    document = json::parse(text);
+    document = json::parse(text, check_depth);
   } catch (const json::exception& error) {
     throw Error(ErrorCode::kBadInput, fmt::format("{}: not JSON: {}", file.string(), error.what()));
   }

@@ -134,6 +134,20 @@ TEST_CASE("an extent of zero, one point or no point at all gives a usable frame"
   CHECK(make_local_frame({}, {}).scale == 1.0);
 }
 
+TEST_CASE("an extent near the smallest double gives a usable frame") {
+  for (const double size : {0x1p-1021, 0x1p-1023, 1e-310, 0x1p-1050}) {
+    CAPTURE(size);
+    const std::vector<dvec3> corners = {{0.0, 0.0, 0.0}, {size, 0.0, 0.0}, {0.0, size, 0.0}};
+    const LocalFrame frame = make_local_frame(corners, {});
+    CHECK(std::isfinite(frame.scale));
+    for (const dvec3& corner : corners) {
+      const vec3 p = frame.to_lattice(corner);
+      for (int axis = 0; axis < 3; ++axis) CHECK(std::fabs(p[axis]) <= 1.0f);
+    }
+    CHECK(frame.to_lattice(corners[1]).x > frame.to_lattice(corners[0]).x);
+  }
+}
+
 TEST_CASE("a coordinate that is not finite is refused on every axis, in geometry and in lights") {
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     for (int axis = 0; axis < 3; ++axis) {

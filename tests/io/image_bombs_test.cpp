@@ -116,6 +116,18 @@ void write_with(const std::string& name, int channels, OIIO::TypeDesc type) {
   REQUIRE(output->close());
 }
 
+TEST_CASE("S38 image_bombs: a JPEG whose few bytes claim a gigabyte is refused before libjpeg fills it with grey") {
+  const Scratch scratch;
+  write_with(scratch.path("a.jpg").string(), 3, OIIO::TypeUInt8);
+  std::string bytes = test::read_bytes(scratch.path("a.jpg"));
+  const std::size_t frame = bytes.find("\xff\xc0");
+  REQUIRE(frame != std::string::npos);
+  for (const std::uint32_t side : {4000u, 18000u, 30000u}) {
+    bytes.replace(frame + 5, 4, big_endian(side << 16 | side));
+    check_bomb(bytes);
+  }
+}
+
 TEST_CASE("S38 image_bombs: pictures cut off at each sixteenth are refused, whole ones are read") {
   for (const std::string name : {"a.png", "a.jpg", "a.exr"}) {
     CAPTURE(name);

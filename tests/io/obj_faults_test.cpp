@@ -1,4 +1,5 @@
 // S36: every OBJ row of the table of input faults.
+#include <ctime>
 #include <random>
 
 #include <sys/stat.h>
@@ -148,6 +149,23 @@ TEST_CASE("S36 obj_faults: directories, devices, fifos and missing files are ref
     CHECK(outcome.has(expected));
     CHECK(outcome.seconds < test::kHang);
   }
+}
+
+TEST_CASE("S36 obj_faults: very many unknown materials are listed in no more than linear time") {
+  const Scratch scratch;
+  const auto seconds = [&](int count) {
+    std::string text = kVertices;
+    for (int i = 0; i < count; ++i) text += "usemtl " + std::to_string(i) + "\nf 1 2 3\n";
+    ObjLoadReport report;
+    const auto file = scratch.write("many.obj", text);
+    const std::clock_t start = std::clock();
+    load_obj(file, {}, report);
+    CHECK(report.missing.size() == static_cast<std::size_t>(count));
+    return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  };
+  // 16 times as many took 250 times as long when each was compared with all before it.
+  const double few = seconds(5000), many = seconds(80000);
+  CHECK(many < 0.2 + 64.0 * few);
 }
 
 TEST_CASE("S36 obj_faults: files and lines that are too long are refused") {

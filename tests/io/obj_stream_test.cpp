@@ -1,3 +1,4 @@
+#include <cfenv>
 #include <string>
 
 #include "rasterizer/io/obj_scene.h"
@@ -57,6 +58,35 @@ TEST_CASE("an OBJ read in pieces of any size has the triangles of the whole file
       CHECK(streamed.missing == report.missing);
     }
   }
+}
+
+TEST_CASE("a byte order mark counts at the start of the file alone, wherever a piece starts") {
+  const Scratch scratch;
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const auto file = scratch.write("a.obj", "\xef\xbb\xbf" + triangle +
+                                               "\xef\xbb\xbf"
+                                               "f 1 3 2\nf 2 1 3\n");
+  ObjLoadReport report;
+  CHECK(load_obj(file, {}, report).triangles.size() == 2);
+  for (const std::size_t chunk : {1u, 8u, 1000u}) {
+    SceneStream stream = stream_obj(file, {}, report, chunk);
+    std::size_t count = 0;
+    for (stream.rewind(); stream.next(stream.piece);) count += stream.piece.triangles.size();
+    CHECK(count == 2);
+  }
+}
+
+TEST_CASE("the caller's rounding mode changes nothing of an OBJ, whole or in pieces") {
+  const Scratch scratch;
+  scratch.write("m.mtl", "newmtl red\nKd 1 0 0\n");
+  const auto file = scratch.write("a.obj", sample_text("\n"));
+  ObjLoadReport report;
+  const Scene whole = load_obj(file, {}, report);
+  std::fesetround(FE_UPWARD);
+  SceneStream stream = stream_obj(file, {}, report, 64);
+  check_equal(whole, stream);
+  CHECK(std::fegetround() == FE_UPWARD);
+  std::fesetround(FE_TONEAREST);
 }
 
 TEST_CASE("errors in an OBJ read in pieces name the line of the whole file") {

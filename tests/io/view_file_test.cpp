@@ -177,6 +177,17 @@ TEST_CASE("wrong lights are refused with file, place, value and what is allowed"
   }
 }
 
+// The message would show the value, and showing nested values recurses.
+TEST_CASE("values nested without end are refused") {
+  for (const std::size_t depth : {30u, 1000u, 1000000u}) {
+    CAPTURE(depth);
+    const std::string nested = std::string(depth, '[') + std::string(depth, ']');
+    const auto outcome = load(R"({"lights": [], "camera": )" + nested + "}");
+    CHECK(outcome.code == ErrorCode::kBadInput);
+    CHECK(outcome.has(depth == 30 ? "allowed an object" : "a.view.json: nested more than 32 deep"));
+  }
+}
+
 TEST_CASE("files that are not JSON, or not of this form, are refused") {
   for (const char* text : {"", "{", "nonsense", "{\"camera\": 1e999}", "\xff\xfe", "{\"camera\": NaN}"}) {
     CHECK(load(text).has("a.view.json: not JSON"));
