@@ -1,6 +1,6 @@
 // What the exact engine does for every kind of sample arrangement, per instruction set: the cluster's shaft against the
 // tree of blockers, and 16 triangles of a leaf against one receiver up to their bounding rectangles on the light.
-// Included once per Highway target by exact_kernel.cpp (samples anywhere) and row_kernel.cpp (samples in rows).
+// Included once per Highway target by exact_kernel.cpp (samples anywhere) and packet_kernel.cpp (samples in rows).
 
 #if defined(HALFSHADE_EXACT_CLUSTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_EXACT_CLUSTER_INL_H_
