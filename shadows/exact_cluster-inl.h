@@ -118,13 +118,13 @@ HWY_INLINE void SortLeaves(const Shaft& shaft, ExactScratch& scratch) {
     scratch.keys.emplace_back(-area, i);
   }
   std::sort(scratch.keys.begin(), scratch.keys.end());
-  const auto reorder = [&](auto& values) {
-    auto old = values;
+  const auto reorder = [&](auto& values, auto& old) {
+    old = values;
     for (std::size_t i = 0; i < count; ++i) values[i] = old[scratch.keys[i].second];
   };
-  reorder(scratch.leaf);
+  reorder(scratch.leaf, scratch.old_leaf);
   for (int k = 0; k < 3; ++k) {
-    reorder(scratch.low[k]), reorder(scratch.high[k]);
+    reorder(scratch.low[k], scratch.old_bound), reorder(scratch.high[k], scratch.old_bound);
     scratch.low[k].resize(count + kMaxLanes, 1e30f);  // padding: boxes that no shaft meets
     scratch.high[k].resize(count + kMaxLanes, -1e30f);
   }

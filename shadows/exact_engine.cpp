@@ -91,6 +91,7 @@ void even_out(std::vector<ExactScratch>& scratches) {
   }
   for (ExactScratch& s : scratches) {
     s.stack.reserve(nodes), s.leaf.reserve(leaves), s.keys.reserve(leaves);
+    s.old_leaf.reserve(leaves), s.old_bound.reserve(leaves);
     for (int k = 0; k < 3; ++k) s.low[k].reserve(leaves), s.high[k].reserve(leaves);
   }
 }

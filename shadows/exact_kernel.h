@@ -45,6 +45,8 @@ struct ExactScratch {
   std::vector<std::uint32_t> stack, leaf;             // node stack; collected leaves
   std::vector<float> low[3], high[3];                 // their boxes, light frame, padded to full vectors
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
+  std::vector<std::uint32_t> old_leaf;                // what is being sorted
+  std::vector<float> old_bound;
   KernelCounters counters;
   std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0;
 };

@@ -162,8 +162,7 @@ AtlasEntry overlapping_cards(std::uint32_t side) {
       "of it from the middle of the wall.";
   entry.across = "x", entry.down = "y";
   entry.add_variant("accumulation sum, K = 5", "accumulation sum", {"shadow-accumulation.kernel=5"});
-  entry.add_variant("accumulation sum, K = 32", "accumulation sum", {"shadow-accumulation.kernel=32"},
-                    "Both cards are counted where they overlap: sums up to 1.6, clamped to full shadow.");
+  entry.add_variant("accumulation sum, K = 32", "accumulation sum", {"shadow-accumulation.kernel=32"});
   return entry;
 }
 

@@ -38,7 +38,7 @@ TEST_CASE("frames allocate nothing after warm-up") {
       s.scene.set_positions(s.ids[2], deformed);
       s.scene.commit(execution);
       for (std::size_t i = 0; i < ground.positions.size(); ++i) {
-        ground.positions[i].y = 0.01 * ((i * 7 + static_cast<std::size_t>(f)) % 11);
+        ground.positions[i].y = 0.01 * static_cast<double>((i * 7 + static_cast<std::size_t>(f)) % 11);
       }
       lights[0].emission = vec3(0.1f * static_cast<float>(f));
       solver.solve(s.scene, ground.view(), lights, workspace, {masks, visibility, irradiance, total}, execution);

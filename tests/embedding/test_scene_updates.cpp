@@ -38,7 +38,7 @@ TEST_CASE("a scene of meshes gives the oracle's bits") {
 TEST_CASE("moving a mesh rounds that mesh alone and gives the bits of a scene made at once") {
   EmbedScene s;
   const std::uint64_t rounded = s.scene.stats().meshes_rounded;
-  for (int step = 0; step < 4; ++step) {
+  for (int step = 1; step <= 4; ++step) {
     CAPTURE(step);
     s.meshes[1].transform = turned(0.2 * step, {0.7 - 0.3 * step, 1.0, 0.2});
     s.scene.set_transform(s.ids[1], s.meshes[1].transform);

@@ -60,7 +60,9 @@ TEST_CASE("several lights in one call equal one call each; masks have the words 
         CHECK(blocked_bits(one.masks) > 0);
       }
       CHECK(all.total == total);
-      CHECK(workspace.stats().lights_kept == (call == 1 && kept == 3 ? 3 : 0));
+      // A workspace with room for fewer lights than it is asked for may still have one of them.
+      CHECK(workspace.stats().lights_kept <= (call == 1 ? kept : 0));
+      if (call == 1 && kept == 3) CHECK(workspace.stats().lights_kept == 3);
     }
   }
 }

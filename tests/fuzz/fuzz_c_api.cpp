@@ -252,7 +252,8 @@ class Host {
                 const halfshade_receivers& receivers, const halfshade_light& light, Masks& masks) {
     std::size_t words = 0;
     if (!ok(halfshade_solver_mask_words(context_, solver, &light, 1, &words))) return false;
-    require(words >= 1 && words <= 64, "1..4096 samples have 1..64 words");
+    require(words <= 64, "no light has more than 4096 samples");
+    if (words == 0) return false;  // a light of no samples
     masks.assign(words * receivers.positions.count, ~std::uint64_t{0});
     halfshade_output output = HALFSHADE_OUTPUT_INIT;
     output.masks = masks.data(), output.mask_count = masks.size();

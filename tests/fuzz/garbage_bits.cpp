@@ -79,7 +79,7 @@ class Garbage {
     const std::size_t t = random_.engine() % triangles.size();
     const auto bits = static_cast<std::uint32_t>(random_.engine());
     const std::uint32_t number = bits % 4 == 0 ? bits % 64 : bits;
-    const std::string range = " " + std::to_string(number) + " is out of range";
+    const std::string range = std::string(" ").append(std::to_string(number)).append(" is out of range");
     if (bits % 3 == 0) {
       triangles[t][bits % 2] = number;
       if (number >= c.scene.positions.size()) c.fault = "triangle " + std::to_string(t) + ": position" + range;

@@ -136,7 +136,7 @@ class S25(Case):
             budget, share = 512 + 64 + self.render(path, "--size", "16x16", "--light-samples", 1)[2], "0.02"
         else:
             budget, share = 512 + 64, "0.2"
-        for coarse in ("true", "false"):
+        for coarse in ("on", "off"):
             with self.subTest(coarse=coarse):
                 out, _, peak = self.render(path, "--size", "128x128", "--light-samples", 16, "--method", "gears", "--set",
                                            "gears.grid=128", "--set", f"gears.coarse={coarse}", "--verify", share,
