@@ -29,7 +29,7 @@ def look(page, actions):
     with tempfile.TemporaryDirectory(prefix="halfshade-browser-", ignore_cleanup_errors=True) as profile:
         result = subprocess.run(
             [program(), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
-             "--enable-logging=stderr", "--virtual-time-budget=4000", "--dump-dom", acted.as_uri()],
+             "--enable-logging=stderr", "--virtual-time-budget=30000", "--dump-dom", acted.as_uri()],
             capture_output=True, text=True, timeout=300, check=False)
     console = [line for line in result.stderr.splitlines() if "CONSOLE" in line]
     if console:
