@@ -108,8 +108,9 @@ ordered_json merge_json(const RenderOptions& o, const std::vector<Part>& parts, 
 int render_frames_part(const RenderOptions& options, PartNumber number) {
   if (options.frames < 1 || options.frames > kMostFrames)
     usage_error(fmt::format("--frames {} is not in 1..{}", options.frames, kMostFrames));
+  if (number.count > options.frames)
+    usage_error(fmt::format("--part {}: there are only {} frames", options.part, options.frames));
   const PartRange range = share_of({0, options.frames}, number);
-  if (range.size() == 0) usage_error(fmt::format("--part {}: there are only {} frames", options.part, options.frames));
   Pipeline pipeline;
   open_pipeline(options, 40.0, pipeline);
   warn_of_panes(pipeline);

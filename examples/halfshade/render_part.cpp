@@ -195,9 +195,9 @@ int render_part(const RenderOptions& options) {
   const PartRange whole_rows = pixel_rows(render);
   PartRange rows = whole_rows;
   if (split == PartSplit::kCrop) {
-    rows = share_of(whole_rows, number);
-    if (rows.size() == 0)
+    if (number.count > whole_rows.size())
       usage_error(fmt::format("--part {}: the picture has only {} rows", options.part, whole_rows.size()));
+    rows = share_of(whole_rows, number);
     render.options.crop = crop_text(render.raster.window, render.subsamples, rows);
   }
   open_pipeline(render.options, 0.0, render);

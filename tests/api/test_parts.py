@@ -239,8 +239,8 @@ class Refused(Parts):
         for extra in (("--part", "0/2"), ("--part", "3/2"), ("--part", "1"), ("--part", "1/2x"), ("--part", "a/b"),
                       ("--part", "1/2", "--split", "half"), ("--part", "1/2", "--method", "pcss"),
                       ("--part", "1/2", "--method", "afsm-lut"), ("--part", "1/2", "--resume"),
-                      ("--part", "1/2", "--stream"), ("--part", "1/2", "--dump", part), ("--part", "25/25"),
-                      ("--part", "9/9", "--split", "frames", "--frames", 4),
+                      ("--part", "1/2", "--stream"), ("--part", "1/2", "--dump", part), ("--part", "1/25"),
+                      ("--part", "25/25"), ("--part", "9/9", "--split", "frames", "--frames", 4),
                       ("--part", "1/2", "--split", "frames", "--frames", 0), ("--resume", "--method", "raytrace")):
             with self.subTest(extra=extra):
                 self.expect(USAGE, "render", *self.SCENE, "-o", part, *extra)
