@@ -34,7 +34,7 @@ def long_render():
     width = 80
     while True:
         arguments = ("builtin:hairball:1000", "--size", f"{width}x{width * 3 // 4}", "--light-samples", "256", "--quiet",
-                     "--resume", "--band-seconds", "0.05", "--threads", "1")
+                     "--resume", "--band-seconds", "0.1", "--threads", "1")
         with tempfile.TemporaryDirectory(prefix="halfshade-interrupted-") as scratch:
             start = time.monotonic()
             subprocess.run([PROGRAM, "render", *arguments, "-o", f"{scratch}/a.png"], check=True, capture_output=True)
@@ -219,7 +219,7 @@ class S41(Interrupted):
 
 
 class S42(Interrupted):
-    ROUNDS = 12
+    ROUNDS = 8
     LIMIT_MS = 250.0
 
     def interrupt(self, arguments, after, signals=1):
