@@ -51,6 +51,13 @@ void check_numbers(const ShadowConfig& config) {
   }
 }
 
+void check_sample_points(const Light& light) {
+  require(!light.points.empty(), light, "there are no sample points");
+  if (light.points.size() <= 4096) return;
+  throw Error(ErrorCode::kUsage, "light '" + light.name + "': " + std::to_string(light.points.size()) +
+                                     " sample points, 1..4096 are allowed");
+}
+
 void check_shape(const Light& light) {
   if (light.shape == LightShape::kSun) {
     throw Error(ErrorCode::kUsage,
@@ -63,11 +70,7 @@ void check_shape(const Light& light) {
   require(std::all_of(light.axes.begin(), light.axes.end(), is_finite), light, "a coordinate is not finite");
   require(light.shape != LightShape::kDisk || glm::length(light.normal) > 0.0, light, "the normal is zero");
   if (light.shape == LightShape::kSamples) {
-    require(!light.points.empty(), light, "there are no sample points");
-    if (light.points.size() > 4096) {
-      throw Error(ErrorCode::kUsage, "light '" + light.name + "': " + std::to_string(light.points.size()) +
-                                         " sample points, 1..4096 are allowed");
-    }
+    check_sample_points(light);
     require(std::all_of(light.points.begin(), light.points.end(), is_finite), light, "a sample point is not finite");
   }
 }
@@ -157,7 +160,10 @@ void check_light(const Light& light, const ShadowConfig& config) {
 }
 
 std::uint32_t samples_of(const Light& light, const ShadowConfig& config) {
-  if (light.shape == LightShape::kSamples) return static_cast<std::uint32_t>(light.points.size());
+  if (light.shape == LightShape::kSamples) {
+    check_sample_points(light);
+    return static_cast<std::uint32_t>(light.points.size());
+  }
   return light.shape == LightShape::kPoint ? 1 : config.light_sample_count;
 }
 
