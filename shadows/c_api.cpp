@@ -207,6 +207,25 @@ const char* halfshade_last_error(const halfshade_context* context) {
   return is_valid(context) ? context->message : "context is NULL or not a context";
 }
 
+halfshade_status halfshade_place_sun(halfshade_context* context, const halfshade_light* sun, const double* low,
+                                     const double* high, halfshade_light* placed) {
+  return guarded(context, [&] {
+    Light light;
+    to_light(sun, "sun", light);
+    checked_out(low, "low");
+    checked_out(high, "high");
+    light = place_sun(light, {low[0], low[1], low[2]}, {high[0], high[1], high[2]});
+    halfshade_light result = read_struct(sun, "sun");
+    result.shape = static_cast<halfshade_light_shape>(light.shape);
+    result.radius = light.radius;
+    for (int axis = 0; axis < 3; ++axis) {
+      result.center[axis] = light.center[axis];
+      result.normal[axis] = light.normal[axis];
+    }
+    write_struct(placed, result, "placed");
+  });
+}
+
 halfshade_status halfshade_scene_create(halfshade_context* context, const halfshade_scene_desc* desc,
                                         halfshade_scene** scene) {
   return guarded(context, [&] {

@@ -14,8 +14,9 @@ static_assert(static_cast<int>(LightShape::kPoint) == HALFSHADE_LIGHT_POINT &&
               static_cast<int>(LightShape::kSphere) == HALFSHADE_LIGHT_SPHERE &&
               static_cast<int>(LightShape::kSamples) == HALFSHADE_LIGHT_SAMPLES &&
               static_cast<int>(LightShape::kEllipsoid) == HALFSHADE_LIGHT_ELLIPSOID &&
-              static_cast<int>(LightShape::kPolygon) == HALFSHADE_LIGHT_POLYGON);
-static_assert(kNone == HALFSHADE_NONE);
+              static_cast<int>(LightShape::kPolygon) == HALFSHADE_LIGHT_POLYGON &&
+              static_cast<int>(LightShape::kSun) == HALFSHADE_LIGHT_SUN);
+static_assert(kNone == HALFSHADE_NONE && kDefaultLift == HALFSHADE_DEFAULT_LIFT);
 
 namespace {
 
@@ -168,9 +169,9 @@ Transform to_transform(const double* rows) {
 
 void to_light(const halfshade_light* given, const std::string& name, Light& light) {
   const halfshade_light desc = read_struct(given, name.c_str());
-  if (desc.shape < HALFSHADE_LIGHT_POINT || desc.shape > HALFSHADE_LIGHT_POLYGON) {
+  if (desc.shape < HALFSHADE_LIGHT_POINT || desc.shape > HALFSHADE_LIGHT_SUN) {
     usage(name + ".shape is " + std::to_string(static_cast<int>(desc.shape)) + ", allowed are 0 to " +
-          std::to_string(static_cast<int>(HALFSHADE_LIGHT_POLYGON)));
+          std::to_string(static_cast<int>(HALFSHADE_LIGHT_SUN)));
   }
   light.shape = static_cast<LightShape>(desc.shape);
   light.center = to_point(desc.center);
@@ -182,6 +183,7 @@ void to_light(const halfshade_light* given, const std::string& name, Light& ligh
   read_points(desc.points, name + ".points", light.points);
   light.two_sided = desc.two_sided != 0;
   light.emission = to_color(desc.emission);
+  light.angular_diameter_deg = desc.angular_diameter_deg;
   read_emission_image(desc, name, light.emission_image);
 }
 
