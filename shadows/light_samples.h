@@ -28,7 +28,10 @@ struct LightSamples {
 };
 
 /// Throws Error{kUsage} for counts out of range, Error{kBadInput} for a degenerate light (message names the light).
-LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame);
+/// `reuse` gives its memory: with samples of an earlier place of the light nothing is allocated, but for polygons and
+/// Poisson disks.
+LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame,
+                                LightSamples reuse = {});
 
 /// Throws what make_light_samples throws for this light or configuration.
 void check_light(const Light& light, const ShadowConfig& config);

@@ -34,7 +34,8 @@ struct LightBound {
   std::vector<dvec2> outline;  // flat lights: convex polygon around the samples, in units of axis_u, axis_v
 };
 
-LightBound make_light_bound(const Light& light, const LightSamples& samples);
+/// `reuse` gives its memory.
+LightBound make_light_bound(const Light& light, const LightSamples& samples, LightBound reuse = {});
 
 /// The grid of one view: columns x rows cells over warped slopes.
 struct LightGrid {
