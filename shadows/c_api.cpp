@@ -132,7 +132,7 @@ Execution to_execution(const halfshade_context_desc* given) {
   Execution execution;
   if (given == nullptr) return execution;
   const halfshade_context_desc desc = read_struct(given, "context");
-  switch (desc.executor) {
+  switch (number_of(desc.executor)) {
     case HALFSHADE_EXECUTOR_ARENA:
       execution.executor = Executor::kArena;
       break;

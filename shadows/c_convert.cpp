@@ -86,9 +86,10 @@ void check_array(const void* data, std::size_t count, std::size_t stride_bytes, 
 }
 
 PointView to_view(const halfshade_points& points, const std::string& name) {
-  const bool is_double = points.scalar == HALFSHADE_FLOAT64;
-  if (!is_double && points.scalar != HALFSHADE_FLOAT32) {
-    usage(name + ".scalar is " + std::to_string(static_cast<int>(points.scalar)) + ", allowed are 0 and 1");
+  const int scalar = number_of(points.scalar);
+  const bool is_double = scalar == HALFSHADE_FLOAT64;
+  if (!is_double && scalar != HALFSHADE_FLOAT32) {
+    usage(name + ".scalar is " + std::to_string(scalar) + ", allowed are 0 and 1");
   }
   check_array(points.data, points.count, points.stride_bytes, 3 * (is_double ? sizeof(double) : sizeof(float)), 1,
               name);
@@ -169,11 +170,12 @@ Transform to_transform(const double* rows) {
 
 void to_light(const halfshade_light* given, const std::string& name, Light& light) {
   const halfshade_light desc = read_struct(given, name.c_str());
-  if (desc.shape < HALFSHADE_LIGHT_POINT || desc.shape > HALFSHADE_LIGHT_SUN) {
-    usage(name + ".shape is " + std::to_string(static_cast<int>(desc.shape)) + ", allowed are 0 to " +
+  const int shape = number_of(desc.shape);
+  if (shape < HALFSHADE_LIGHT_POINT || shape > HALFSHADE_LIGHT_SUN) {
+    usage(name + ".shape is " + std::to_string(shape) + ", allowed are 0 to " +
           std::to_string(static_cast<int>(HALFSHADE_LIGHT_SUN)));
   }
-  light.shape = static_cast<LightShape>(desc.shape);
+  light.shape = static_cast<LightShape>(shape);
   light.center = to_point(desc.center);
   light.u = to_point(desc.u);
   light.v = to_point(desc.v);

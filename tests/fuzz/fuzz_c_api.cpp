@@ -3,6 +3,7 @@
 #include "halfshade/c_api.h"
 
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "fuzz/coordinates.h"
@@ -235,7 +236,8 @@ class Host {
 
   halfshade_light light() {
     halfshade_light light = HALFSHADE_LIGHT_INIT;
-    light.shape = static_cast<halfshade_light_shape>(in_.broken() ? 8 : in_.below(8));  // 8 is none
+    const std::uint32_t shape = in_.broken() ? 8 : in_.below(8);  // 8 is none
+    std::memcpy(&light.shape, &shape, sizeof shape);
     light.two_sided = in_.flag();
     light_points_ = points(5);
     light.points = view_of(light_points_);
@@ -244,7 +246,7 @@ class Host {
     put(in_.point(), light.u), put(in_.point(), light.v), put(in_.point(), light.normal);
     for (int k = 0; k < 3; ++k) put(in_.point(), light.axes[k]);
     light.radius = in_.coordinate();
-    if (light.shape == HALFSHADE_LIGHT_SUN && in_.flag()) place(light);
+    if (shape == HALFSHADE_LIGHT_SUN && in_.flag()) place(light);
     return light;
   }
 
