@@ -139,7 +139,6 @@ int main(int argc, char** argv) {
   ReceiverView receivers;
   receivers.positions = points.position;
   receivers.normals = points.normal;
-  receivers.lift = 2.0 * 1e-3 / (scene.reach()[1].x - scene.reach()[0].x);  // a millimetre
   const std::size_t count = points.position.size();
   std::vector<float> lit(suns.size() * count);
   Workspace workspace;

@@ -132,7 +132,7 @@ Execution to_execution(const halfshade_context_desc* given) {
   Execution execution;
   if (given == nullptr) return execution;
   const halfshade_context_desc desc = read_struct(given, "context");
-  switch (desc.executor) {
+  switch (number_of(desc.executor)) {
     case HALFSHADE_EXECUTOR_ARENA:
       execution.executor = Executor::kArena;
       break;
@@ -205,6 +205,25 @@ void halfshade_context_destroy(halfshade_context** context) { destroy(context); 
 
 const char* halfshade_last_error(const halfshade_context* context) {
   return is_valid(context) ? context->message : "context is NULL or not a context";
+}
+
+halfshade_status halfshade_place_sun(halfshade_context* context, const halfshade_light* sun, const double* low,
+                                     const double* high, halfshade_light* placed) {
+  return guarded(context, [&] {
+    Light light;
+    to_light(sun, "sun", light);
+    checked_out(low, "low");
+    checked_out(high, "high");
+    light = place_sun(light, {low[0], low[1], low[2]}, {high[0], high[1], high[2]});
+    halfshade_light result = read_struct(sun, "sun");
+    result.shape = static_cast<halfshade_light_shape>(light.shape);
+    result.radius = light.radius;
+    for (int axis = 0; axis < 3; ++axis) {
+      result.center[axis] = light.center[axis];
+      result.normal[axis] = light.normal[axis];
+    }
+    write_struct(placed, result, "placed");
+  });
 }
 
 halfshade_status halfshade_scene_create(halfshade_context* context, const halfshade_scene_desc* desc,

@@ -14,8 +14,9 @@ static_assert(static_cast<int>(LightShape::kPoint) == HALFSHADE_LIGHT_POINT &&
               static_cast<int>(LightShape::kSphere) == HALFSHADE_LIGHT_SPHERE &&
               static_cast<int>(LightShape::kSamples) == HALFSHADE_LIGHT_SAMPLES &&
               static_cast<int>(LightShape::kEllipsoid) == HALFSHADE_LIGHT_ELLIPSOID &&
-              static_cast<int>(LightShape::kPolygon) == HALFSHADE_LIGHT_POLYGON);
-static_assert(kNone == HALFSHADE_NONE);
+              static_cast<int>(LightShape::kPolygon) == HALFSHADE_LIGHT_POLYGON &&
+              static_cast<int>(LightShape::kSun) == HALFSHADE_LIGHT_SUN);
+static_assert(kNone == HALFSHADE_NONE && kDefaultLift == HALFSHADE_DEFAULT_LIFT);
 
 namespace {
 
@@ -85,9 +86,10 @@ void check_array(const void* data, std::size_t count, std::size_t stride_bytes, 
 }
 
 PointView to_view(const halfshade_points& points, const std::string& name) {
-  const bool is_double = points.scalar == HALFSHADE_FLOAT64;
-  if (!is_double && points.scalar != HALFSHADE_FLOAT32) {
-    usage(name + ".scalar is " + std::to_string(static_cast<int>(points.scalar)) + ", allowed are 0 and 1");
+  const int scalar = number_of(points.scalar);
+  const bool is_double = scalar == HALFSHADE_FLOAT64;
+  if (!is_double && scalar != HALFSHADE_FLOAT32) {
+    usage(name + ".scalar is " + std::to_string(scalar) + ", allowed are 0 and 1");
   }
   check_array(points.data, points.count, points.stride_bytes, 3 * (is_double ? sizeof(double) : sizeof(float)), 1,
               name);
@@ -168,11 +170,12 @@ Transform to_transform(const double* rows) {
 
 void to_light(const halfshade_light* given, const std::string& name, Light& light) {
   const halfshade_light desc = read_struct(given, name.c_str());
-  if (desc.shape < HALFSHADE_LIGHT_POINT || desc.shape > HALFSHADE_LIGHT_POLYGON) {
-    usage(name + ".shape is " + std::to_string(static_cast<int>(desc.shape)) + ", allowed are 0 to " +
-          std::to_string(static_cast<int>(HALFSHADE_LIGHT_POLYGON)));
+  const int shape = number_of(desc.shape);
+  if (shape < HALFSHADE_LIGHT_POINT || shape > HALFSHADE_LIGHT_SUN) {
+    usage(name + ".shape is " + std::to_string(shape) + ", allowed are 0 to " +
+          std::to_string(static_cast<int>(HALFSHADE_LIGHT_SUN)));
   }
-  light.shape = static_cast<LightShape>(desc.shape);
+  light.shape = static_cast<LightShape>(shape);
   light.center = to_point(desc.center);
   light.u = to_point(desc.u);
   light.v = to_point(desc.v);
@@ -182,6 +185,7 @@ void to_light(const halfshade_light* given, const std::string& name, Light& ligh
   read_points(desc.points, name + ".points", light.points);
   light.two_sided = desc.two_sided != 0;
   light.emission = to_color(desc.emission);
+  light.angular_diameter_deg = desc.angular_diameter_deg;
   read_emission_image(desc, name, light.emission_image);
 }
 

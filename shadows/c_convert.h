@@ -47,6 +47,15 @@ void write_struct(Struct* out, Struct values, const char* name) {
   std::memcpy(out, &values, sizeof values);
 }
 
+/// The number behind an enumeration of C, where it may be any: C++ must not even look at a value that is none of it.
+template <class Enum>
+int number_of(const Enum& value) {
+  int number = 0;
+  static_assert(sizeof number == sizeof value);
+  std::memcpy(&number, &value, sizeof number);
+  return number;
+}
+
 /// Error{kUsage} when data is missing or the stride shorter than an element, Error{kLimit} when there is too much.
 void check_array(const void* data, std::size_t count, std::size_t stride_bytes, std::size_t element_bytes,
                  std::size_t alignment, const std::string& name);

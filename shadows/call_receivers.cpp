@@ -46,8 +46,9 @@ void check_lengths(const ReceiverView& view) {
   if (view.meshes.empty() != view.triangles.empty()) {
     throw Error(ErrorCode::kUsage, "receivers: own meshes and own triangles belong together");
   }
-  if (!(view.lift >= 0.0 && view.lift <= 1.0)) {
-    throw Error(ErrorCode::kUsage, "receivers: lift " + std::to_string(view.lift) + " is not in 0..1");
+  if (!((view.lift >= 0.0 && view.lift <= 1.0) || view.lift == kDefaultLift)) {
+    throw Error(ErrorCode::kUsage,
+                "receivers: lift " + std::to_string(view.lift) + " is neither in 0..1 nor -1, the default");
   }
   if (view.positions.count >= kNone) {
     throw Error(ErrorCode::kLimit,
@@ -98,6 +99,7 @@ void read_receivers(const ShadowScene::Impl& scene, const ReceiverView& view, Ca
   receivers.resize(view.positions.count);
   receivers.has_normals = !view.normals.empty();
   const LocalFrame& frame = scene.mesh.frame;
+  const double lift = view.lift == kDefaultLift ? default_lift(scene.reach) : view.lift;
   FirstWrong first_wrong;
   parallel_ranges(view.positions.count, kPart, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
@@ -110,7 +112,7 @@ void read_receivers(const ShadowScene::Impl& scene, const ReceiverView& view, Ca
         first_wrong.note(i);
         continue;
       }
-      receivers.position[i] = snap_to_lattice(frame.to_local(world) + dvec3(normal) * view.lift);
+      receivers.position[i] = snap_to_lattice(frame.to_local(world) + dvec3(normal) * lift);
       receivers.normal[i] = normal;
       receivers.number[i] = view.first + static_cast<std::uint32_t>(i);
       receivers.quad[i] = static_cast<std::uint8_t>(receivers.number[i] % kInterleavedSets);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/reuse.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/alias_free_shadow_map.h"
 #include "shadows/light_view.h"
@@ -25,40 +26,48 @@ void order_receivers(const ReceiverArray& receivers, const LightFrame& frame, Ex
       work.morton, work.order);
 }
 
-/// Bins over the bounding rectangle of all sets.
-void sort_into_bins(const KernelSamples& samples, const LightFrame& frame, SampleRectangles& r) {
+/// One set into its bins: counted, then placed in order.
+void fill_bins(const KernelSamples& samples, const LightFrame& frame, std::uint32_t set, SampleRectangles& r) {
   constexpr std::uint32_t kBins = SampleRectangles::kBins;
-  dvec2 low(HUGE_VAL), high(-HUGE_VAL);
-  std::vector<dvec2> points;
-  for (const vec3& p : samples.points) {
-    points.emplace_back(frame.to_frame(dvec3(p)));
-    low = glm::min(low, points.back()), high = glm::max(high, points.back());
+  const std::size_t first = std::size_t{set} * samples.padded, before = r.binned.size();
+  std::array<std::uint32_t, kBins * kBins + 1> begin{};
+  for (std::uint32_t i = 0; i < samples.count; ++i) {
+    const dvec2 p(frame.to_frame(dvec3(samples.points[first + i])));
+    const dvec2 place = (p - dvec2(r.bins_low)) * dvec2(r.bins_per_unit);
+    const auto column = static_cast<std::uint32_t>(std::clamp(place.x, 0.0, kBins - 1.0));
+    const auto row = static_cast<std::uint32_t>(std::clamp(place.y, 0.0, kBins - 1.0));
+    r.occupied[set][row] |= 1u << column;
+    r.bin_of_sample[first + i] = static_cast<std::uint16_t>(row * kBins + column);
+    ++begin[row * kBins + column + 1];
   }
-  r.bins_low = vec2(low);
-  r.bins_per_unit = vec2(double{kBins} / glm::max(high - low, dvec2(1e-12)));
-  r.occupied.assign(samples.sets, {});
-  r.bin_of_sample.assign(points.size(), 0);
-  for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    std::vector<std::vector<std::uint16_t>> bins(kBins * kBins);
-    for (std::uint32_t i = 0; i < samples.count; ++i) {
-      const std::size_t at = std::size_t{set} * samples.padded + i;
-      const dvec2 place = (points[at] - dvec2(r.bins_low)) * dvec2(r.bins_per_unit);
-      const auto column = static_cast<std::uint32_t>(std::clamp(place.x, 0.0, kBins - 1.0));
-      const auto row = static_cast<std::uint32_t>(std::clamp(place.y, 0.0, kBins - 1.0));
-      r.occupied[set][row] |= 1u << column;
-      r.bin_of_sample[at] = static_cast<std::uint16_t>(row * kBins + column);
-      bins[row * kBins + column].push_back(static_cast<std::uint16_t>(i));
-    }
-    for (const auto& bin : bins) {
-      r.bin_begin.push_back(static_cast<std::uint32_t>(r.binned.size()));
-      r.binned.insert(r.binned.end(), bin.begin(), bin.end());
-    }
-    r.bin_begin.push_back(static_cast<std::uint32_t>(r.binned.size()));
+  for (std::size_t bin = 1; bin < begin.size(); ++bin) begin[bin] += begin[bin - 1];
+  for (const std::uint32_t b : begin) r.bin_begin.push_back(static_cast<std::uint32_t>(before) + b);
+  r.binned.resize(before + samples.count);
+  for (std::uint32_t i = 0; i < samples.count; ++i) {
+    r.binned[before + begin[r.bin_of_sample[first + i]]++] = static_cast<std::uint16_t>(i);
   }
 }
 
-SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame& frame) {
+/// Bins over the bounding rectangle of all sets.
+void sort_into_bins(const KernelSamples& samples, const LightFrame& frame, SampleRectangles& r) {
+  dvec2 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const vec3& p : samples.points) {
+    const dvec2 q(frame.to_frame(dvec3(p)));
+    low = glm::min(low, q), high = glm::max(high, q);
+  }
+  r.bins_low = vec2(low);
+  r.bins_per_unit = vec2(double{SampleRectangles::kBins} / glm::max(high - low, dvec2(1e-12)));
+  r.occupied.assign(samples.sets, {});
+  r.bin_of_sample.assign(samples.points.size(), 0);
+  for (std::uint32_t set = 0; set < samples.sets; ++set) fill_bins(samples, frame, set, r);
+}
+
+SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame& frame, SampleRectangles reuse) {
   SampleRectangles r;
+  r.low_u = emptied(reuse.low_u), r.low_v = emptied(reuse.low_v);
+  r.high_u = emptied(reuse.high_u), r.high_v = emptied(reuse.high_v);
+  r.occupied = emptied(reuse.occupied), r.bin_of_sample = emptied(reuse.bin_of_sample);
+  r.bin_begin = emptied(reuse.bin_begin), r.binned = emptied(reuse.binned);
   const std::size_t count = samples.group_x.size(), groups = samples.padded / KernelSamples::kGroup;
   r.low_u.assign(count, 0.0f), r.low_v.assign(count, 0.0f), r.high_u.assign(count, 0.0f), r.high_v.assign(count, 0.0f);
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
@@ -208,12 +217,15 @@ void ExactWork::reserve(std::size_t count, std::size_t words) {
 
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {
   kept.unfit();
-  const LightBound bound = make_light_bound(light, samples);
-  kept.front = {dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
-  kept.samples = make_kernel_samples(samples, bound, SampleOrder::kAsGiven);
-  kept.rows = find_sample_rows(samples, kept.samples, kept.front);
-  if (kept.rows.empty()) kept.samples = make_kernel_samples(samples, bound);
-  kept.rectangles = make_rectangles(kept.samples, kept.front);
+  kept.bound = make_light_bound(light, samples, std::move(kept.bound));
+  const auto samples_in = [&](SampleOrder order) {
+    kept.samples = make_kernel_samples(samples, kept.bound, order, std::move(kept.samples));
+  };
+  kept.front = {dvec3(kept.bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
+  samples_in(SampleOrder::kAsGiven);
+  kept.rows = find_sample_rows(samples, kept.samples, kept.front, std::move(kept.rows));
+  if (kept.rows.empty()) samples_in(SampleOrder::kNeighboursTogether);
+  kept.rectangles = make_rectangles(kept.samples, kept.front, std::move(kept.rectangles));
 }
 
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,

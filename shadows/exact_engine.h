@@ -8,6 +8,7 @@
 
 #include "shadows/closed_components.h"
 #include "shadows/exact_kernel.h"
+#include "shadows/light_view.h"
 #include "shadows/morton_order.h"
 
 namespace halfshade {
@@ -30,6 +31,7 @@ struct ExactSide {
 
 /// What the engine makes of a light, to be kept from call to call.
 struct ExactLight {
+  LightBound bound;
   LightFrame front;
   KernelSamples samples;
   SampleRows rows;              // empty: samples anywhere
@@ -56,7 +58,7 @@ struct ExactWork {
   void reserve(std::size_t count, std::size_t words);
 };
 
-/// For flat lights.
+/// For flat lights. What `kept` held before gives its memory.
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept);
 
 /// Masks of all receivers, exact, by a light that was prepared. Allocates nothing where `work` has room for the

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rasterizer/core/reuse.h"
 #include "rasterizer/core/unit_circle.h"
 #include "shadows/polygon_light.h"
 #include "shadows/sample_patterns.h"
@@ -51,6 +52,13 @@ void check_numbers(const ShadowConfig& config) {
   }
 }
 
+void check_sample_points(const Light& light) {
+  require(!light.points.empty(), light, "there are no sample points");
+  if (light.points.size() <= 4096) return;
+  throw Error(ErrorCode::kUsage, "light '" + light.name + "': " + std::to_string(light.points.size()) +
+                                     " sample points, 1..4096 are allowed");
+}
+
 void check_shape(const Light& light) {
   if (light.shape == LightShape::kSun) {
     throw Error(ErrorCode::kUsage,
@@ -63,11 +71,7 @@ void check_shape(const Light& light) {
   require(std::all_of(light.axes.begin(), light.axes.end(), is_finite), light, "a coordinate is not finite");
   require(light.shape != LightShape::kDisk || glm::length(light.normal) > 0.0, light, "the normal is zero");
   if (light.shape == LightShape::kSamples) {
-    require(!light.points.empty(), light, "there are no sample points");
-    if (light.points.size() > 4096) {
-      throw Error(ErrorCode::kUsage, "light '" + light.name + "': " + std::to_string(light.points.size()) +
-                                         " sample points, 1..4096 are allowed");
-    }
+    check_sample_points(light);
     require(std::all_of(light.points.begin(), light.points.end(), is_finite), light, "a sample point is not finite");
   }
 }
@@ -157,14 +161,19 @@ void check_light(const Light& light, const ShadowConfig& config) {
 }
 
 std::uint32_t samples_of(const Light& light, const ShadowConfig& config) {
-  if (light.shape == LightShape::kSamples) return static_cast<std::uint32_t>(light.points.size());
+  if (light.shape == LightShape::kSamples) {
+    check_sample_points(light);
+    return static_cast<std::uint32_t>(light.points.size());
+  }
   return light.shape == LightShape::kPoint ? 1 : config.light_sample_count;
 }
 
-LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame) {
+LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame,
+                                LightSamples reuse) {
   check_numbers(config);
   check_shape(light);
   LightSamples samples;
+  samples.points = emptied(reuse.points), samples.outline = emptied(reuse.outline);
   samples.center = frame.to_local(light.center);
   samples.sets = number_of_sets(light, config);
   samples.interleaved = samples.sets == kInterleavedSets && config.interleave;
@@ -186,14 +195,15 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
   }
   samples.count = samples_of(light, config);
   const bool rotate = config.rotate_sets && (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere);
-  const std::vector<dvec2> first =
-      unit_square_samples(config.pattern, samples.count, config.frame, rotate ? 1 : samples.sets, config.seed);
-  for (std::size_t i = 0; i < std::size_t{samples.sets} * samples.count; ++i) {
-    const dvec2 st = first[rotate ? i % samples.count : i];
+  samples.st = unit_square_samples(config.pattern, samples.count, config.frame, rotate ? 1 : samples.sets, config.seed,
+                                   emptied(reuse.st));
+  samples.st.resize(std::size_t{samples.sets} * samples.count);
+  for (std::size_t i = 0; i < samples.st.size(); ++i) {
+    if (rotate) samples.st[i] = samples.st[i % samples.count];
+    const dvec2 st = samples.st[i];
     const auto turn = rotate ? config.frame + static_cast<std::uint32_t>(i / samples.count) : 0;
     const dvec3 offset =
         light.shape == LightShape::kPolygon ? polygon.offset(st) : sample_offset(light, samples, st, turn);
-    samples.st.push_back(st);
     samples.points.push_back(snap_to_lattice(samples.center + frame.to_local_vector(offset)));
   }
   return samples;

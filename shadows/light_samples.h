@@ -28,12 +28,16 @@ struct LightSamples {
 };
 
 /// Throws Error{kUsage} for counts out of range, Error{kBadInput} for a degenerate light (message names the light).
-LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame);
+/// `reuse` gives its memory: with samples of an earlier place of the light nothing is allocated, but for polygons and
+/// Poisson disks.
+LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame,
+                                LightSamples reuse = {});
 
 /// Throws what make_light_samples throws for this light or configuration.
 void check_light(const Light& light, const ShadowConfig& config);
 
-/// 1 for points, their number for explicit samples, else what `config` asks for.
+/// 1 for points, their number for explicit samples, else what `config` asks for. Throws as make_light_samples where
+/// explicit samples are none or too many.
 std::uint32_t samples_of(const Light& light, const ShadowConfig& config);
 
 /// Weights of the samples of every set, [set][sample] (halfshade/emission.h).

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/reuse.h"
 #include "rasterizer/core/unit_circle.h"
 
 namespace halfshade {
@@ -16,22 +17,28 @@ constexpr double kClipFraction = 1.0 / 16.0;
 /// Bounds are widened by this factor against rounding: doubles of order one carry errors near 1e-15.
 constexpr double kWiden = 1.0 + 1e-9;
 
+/// Place in the plane of the first two axes, around `center`.
+dvec2 in_plane(const vec3& p, const dvec3& center, const std::array<dvec3, 3>& axes) {
+  const dvec3 d = dvec3(p) - center;
+  return {glm::dot(d, axes[0]), glm::dot(d, axes[1])};
+}
+
 /// Convex polygon with edges along eight directions around points in the plane; four if `corners` is 4.
-std::vector<dvec2> polygon_around(const std::vector<dvec2>& points, int corners) {
+std::vector<dvec2> polygon_around(const LightSamples& samples, const dvec3& center, const std::array<dvec3, 3>& axes,
+                                  int corners, std::vector<dvec2> polygon) {
   const double d = 0.7071067811865476;
   const std::array<dvec2, 8> normals = {dvec2(1, 0),  dvec2(d, d),   dvec2(0, 1),  dvec2(-d, d),
                                         dvec2(-1, 0), dvec2(-d, -d), dvec2(0, -1), dvec2(d, -d)};
   const int step = 8 / corners;
-  std::vector<double> support;
-  for (int k = 0; k < 8; k += step) {
-    double reach = 0.0;
-    for (const dvec2& p : points) reach = std::max(reach, glm::dot(p, normals[k]));
-    support.push_back(reach * kWiden);
+  std::array<double, 8> reach{};
+  for (const vec3& l : samples.points) {
+    const dvec2 p = in_plane(l, center, axes);
+    for (int k = 0; k < 8; k += step) reach[k] = std::max(reach[k], glm::dot(p, normals[k]));
   }
-  std::vector<dvec2> polygon;
   for (int k = 0; k < corners; ++k) {
-    const dvec2 m = normals[k * step], n = normals[(k + 1) % corners * step];
-    const double determinant = m.x * n.y - m.y * n.x, s = support[k], t = support[(k + 1) % corners];
+    const int next = (k + 1) % corners;
+    const dvec2 m = normals[k * step], n = normals[next * step];
+    const double determinant = m.x * n.y - m.y * n.x, s = reach[k * step] * kWiden, t = reach[next * step] * kWiden;
     polygon.push_back(dvec2(s * n.y - t * m.y, t * m.x - s * n.x) / determinant);
   }
   return polygon;
@@ -232,8 +239,9 @@ double LightGrid::row_border(std::uint32_t row) const {
   return w >= 1.0 ? HUGE_VAL : (w <= -1.0 ? -HUGE_VAL : unwarp(w));
 }
 
-LightBound make_light_bound(const Light& light, const LightSamples& samples) {
+LightBound make_light_bound(const Light& light, const LightSamples& samples, LightBound reuse) {
   LightBound bound;
+  bound.outline = emptied(reuse.outline);
   bound.flat = samples.flat;
   const std::array<dvec3, 3> axes = {samples.axis_u, samples.axis_v, samples.axis_n};
   dvec3 low(HUGE_VAL), high(-HUGE_VAL);  // in the light's axes, around its centre
@@ -245,12 +253,10 @@ LightBound make_light_bound(const Light& light, const LightSamples& samples) {
   const dvec3 middle = (low + high) * 0.5;
   bound.center = snap_to_lattice(samples.center + axes[0] * middle.x + axes[1] * middle.y + axes[2] * middle.z);
   dvec3 reach(0.0);
-  std::vector<dvec2> in_plane;
   for (const vec3& l : samples.points) {
     const dvec3 d = dvec3(l) - dvec3(bound.center);
     const dvec3 q(glm::dot(d, axes[0]), glm::dot(d, axes[1]), glm::dot(d, axes[2]));
     reach = glm::max(reach, glm::abs(q));
-    in_plane.emplace_back(q);
   }
   if (light.shape == LightShape::kSphere || light.shape == LightShape::kEllipsoid) {
     bound.ball = make_ball(light, samples, dvec3(bound.center));
@@ -258,10 +264,13 @@ LightBound make_light_bound(const Light& light, const LightSamples& samples) {
   for (int k = 0; k < 3; ++k) bound.half_axes[k] = axes[k] * (reach[k] * kWiden);
   if (bound.flat && light.shape == LightShape::kPolygon) {
     const dvec3 shift = dvec3(bound.center) - samples.center;
+    std::vector<dvec2> points;
+    for (const vec3& l : samples.points) points.push_back(in_plane(l, dvec3(bound.center), axes));
     bound.outline =
-        polygon_scaled_around(in_plane, samples.outline, {glm::dot(shift, axes[0]), glm::dot(shift, axes[1])});
+        polygon_scaled_around(points, samples.outline, {glm::dot(shift, axes[0]), glm::dot(shift, axes[1])});
   } else if (bound.flat) {
-    bound.outline = polygon_around(in_plane, light.shape == LightShape::kRectangle ? 4 : 8);
+    const int corners = light.shape == LightShape::kRectangle ? 4 : 8;
+    bound.outline = polygon_around(samples, dvec3(bound.center), axes, corners, std::move(bound.outline));
   }
   return bound;
 }

@@ -34,7 +34,8 @@ struct LightBound {
   std::vector<dvec2> outline;  // flat lights: convex polygon around the samples, in units of axis_u, axis_v
 };
 
-LightBound make_light_bound(const Light& light, const LightSamples& samples);
+/// `reuse` gives its memory.
+LightBound make_light_bound(const Light& light, const LightSamples& samples, LightBound reuse = {});
 
 /// The grid of one view: columns x rows cells over warped slopes.
 struct LightGrid {
@@ -69,8 +70,11 @@ struct LightView {
   dvec3 receiver_low{0.0}, receiver_high{0.0};  // box of the receivers on the grid, view coordinates
   LightGrid grid;
 
-  /// Receivers too near to the light's plane, or at too grazing an angle, to be put on the grid.
-  bool too_near(const dvec3& p) const { return p.z < near_z || std::max(std::fabs(p.x), std::fabs(p.y)) > 1e5 * p.z; }
+  /// Receivers too near to the light's plane, or at too grazing an angle, to be put on the grid. near_z is 0 where all
+  /// receivers lie in the plane of a point: they have no slopes.
+  bool too_near(const dvec3& p) const {
+    return p.z < near_z || p.z <= 0.0 || std::max(std::fabs(p.x), std::fabs(p.y)) > 1e5 * p.z;
+  }
 
   dvec3 to_view(const dvec3& p) const {
     const dvec3 d = p - origin;

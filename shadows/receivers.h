@@ -27,11 +27,14 @@ struct ReceiverArray {
 /// Distance by which a receiver is lifted off its triangle along the geometric normal: 4 ulp of a coordinate of size 1,
 /// 2^-21 of the frame (stability.md b8), but no more than 2^-18 of the scene where far lights make the scene small in
 /// its frame.
-inline constexpr double kReceiverOffset = kReceiverLift, kReceiverOffsetOfScene = 0x1p-18;
+inline constexpr double kReceiverOffset = kReceiverLift, kReceiverOffsetOfScene = kReceiverLiftOfScene;
 
-/// Lifted and snapped; `reach` is GBuffer::reach.
+/// `reach` is GBuffer::reach.
+inline double default_lift(double reach) { return std::min(kReceiverOffset, kReceiverOffsetOfScene * reach); }
+
+/// Lifted and snapped.
 inline vec3 lifted_receiver(const dvec3& position, const vec3& normal, double reach) {
-  return snap_to_lattice(position + dvec3(normal) * std::min(kReceiverOffset, kReceiverOffsetOfScene * reach));
+  return snap_to_lattice(position + dvec3(normal) * default_lift(reach));
 }
 
 /// Does the receiver lie at or behind a one-sided light?

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rasterizer/core/hash.h"
+#include "rasterizer/core/reuse.h"
 
 namespace halfshade {
 namespace {
@@ -176,10 +177,10 @@ std::vector<dvec2> poisson_disk_samples(std::uint32_t count, std::uint32_t first
 }  // namespace
 
 std::vector<dvec2> unit_square_samples(SamplePattern pattern, std::uint32_t count, std::uint32_t first_set,
-                                       std::uint32_t sets, std::uint32_t seed) {
+                                       std::uint32_t sets, std::uint32_t seed, std::vector<dvec2> reuse) {
   if (pattern == SamplePattern::kPoissonDisk) return poisson_disk_samples(count, first_set, sets, seed);
   const std::uint32_t rows = row_count(count);
-  std::vector<dvec2> result;
+  std::vector<dvec2> result = emptied(reuse);
   result.reserve(std::size_t{count} * sets);
   for (std::uint32_t set = first_set; set < first_set + sets; ++set) {
     for (std::uint32_t i = 0; i < count; ++i) {

@@ -3,8 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rasterizer/core/reuse.h"
+
 namespace halfshade {
 namespace {
+
+/// No rows, and the memory of those that there were.
+SampleRows no_rows(SampleRows& rows) {
+  SampleRows none;
+  none.place = emptied(rows.place), none.y = emptied(rows.y), none.offset = emptied(rows.offset);
+  none.point_x = emptied(rows.point_x), none.point_y = emptied(rows.point_y), none.point_z = emptied(rows.point_z);
+  none.valid = emptied(rows.valid);
+  return none;
+}
 
 /// Samples per row if every row of every set has the same number at one height, else 0.
 std::uint32_t columns_of(const LightSamples& light) {
@@ -64,8 +75,9 @@ bool space_rows(SampleRows& rows, std::uint32_t sets) {
 
 }  // namespace
 
-SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame) {
-  SampleRows rows;
+SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,
+                            SampleRows reuse) {
+  SampleRows rows = no_rows(reuse);
   const std::uint32_t columns = columns_of(light);
   if (columns == 0 || columns > SampleRows::kMaxColumns || light.count / columns > SampleRows::kMaxRows) return rows;
   const std::uint32_t words = (columns + SampleRows::kWord - 1) / SampleRows::kWord;
@@ -76,7 +88,7 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
   const dvec3 first = frame.to_frame(dvec3(samples.points[0])),
               last = frame.to_frame(dvec3(samples.points[columns - 1]));
   const double pitch = columns > 1 ? (last.x - first.x) / (columns - 1.0) : 1.0;
-  if (!(pitch > 1e-7)) return SampleRows();
+  if (!(pitch > 1e-7)) return no_rows(rows);
   rows.scale = static_cast<float>(1.0 / pitch);
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
     for (std::uint32_t row = 0; row < rows.rows; ++row) {
@@ -88,7 +100,7 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
     rows.most_offset = set == 0 ? *most : std::max(rows.most_offset, *most);
     add_further_words(rows);
   }
-  if (!space_rows(rows, samples.sets)) return SampleRows();
+  if (!space_rows(rows, samples.sets)) return no_rows(rows);
   for (const vec3& p : samples.points) {
     rows.point_x.push_back(p.x), rows.point_y.push_back(p.y), rows.point_z.push_back(p.z);
   }
@@ -99,7 +111,7 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
   }
   for (const float y : rows.y) rows.reach_y = std::max(rows.reach_y, std::fabs(y));
   // Not a rectangle's rows after all (a skewed light, rows along another axis): the general way is made for those.
-  if (rows.deviation * rows.scale > 0.01f) return SampleRows();
+  if (rows.deviation * rows.scale > 0.01f) return no_rows(rows);
   return rows;
 }
 

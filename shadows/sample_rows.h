@@ -36,6 +36,8 @@ struct SampleRows {
 
 /// Empty where the samples have no such rows: other shapes, patterns without rows, more than 64 columns or rows.
 /// `samples` must be in sample order (make_kernel_samples with SampleOrder::kAsGiven).
-SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame);
+/// `reuse` gives its memory.
+SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,
+                            SampleRows reuse = {});
 
 }  // namespace halfshade

@@ -17,10 +17,21 @@ bool same_frame(const LocalFrame& a, const LocalFrame& b) {
   return a.box_min == b.box_min && a.half_extent == b.half_extent && a.scale == b.scale;
 }
 
+double reach_of(const WorldBox& box, const LocalFrame& frame) {
+  double reach = kLatticeUnit;
+  if (box.empty()) return reach;
+  const vec3 far = glm::max(glm::abs(frame.to_lattice(box.low)), glm::abs(frame.to_lattice(box.high)));
+  while (reach < std::max({far.x, far.y, far.z})) reach *= 2.0;
+  return reach;
+}
+
 void choose_frame(SceneImpl& scene) {
-  WorldBox box = scene.extension;
-  for (const StoredMesh& mesh : scene.meshes) box.add(mesh.box);
-  const LocalFrame frame = make_scene_frame(box);
+  WorldBox meshes;
+  for (const StoredMesh& mesh : scene.meshes) meshes.add(mesh.box);
+  WorldBox content = meshes;
+  content.add(scene.extension);
+  const LocalFrame frame = make_scene_frame(content, scene.lights);
+  scene.reach = reach_of(meshes, frame);
   if (same_frame(frame, scene.mesh.frame)) return;
   scene.mesh.frame = frame;
   for (StoredMesh& mesh : scene.meshes) mesh.rounded = false;

@@ -15,10 +15,12 @@ struct WorldBox {
   bool operator==(const WorldBox&) const = default;
 };
 
-/// A cube around the box, its centre on a coarse grid, its half-width a power of two at least as large as the box is
-/// wide: a pure function of the box that changes rarely when the box moves. Whatever lies in the cube gets coordinates
-/// |x| <= 1. A box without extent gets a cube of half-width 1. Throws Error{kBadInput} when the extents overflow.
-LocalFrame make_scene_frame(const WorldBox& box);
+/// A cube around the content, its centre on a coarse grid, its half-width a power of two at least as large as the
+/// content is wide and twice as large as the way to the farthest light: a pure function of the boxes that changes
+/// rarely when they move. Whatever lies in the cube gets coordinates |x| <= 1. Far lights make it wider but leave the
+/// content in its middle, where floats are finest. Without content, lights are it; without extent, the half-width is 1.
+/// Throws Error{kBadInput} when the extents overflow.
+LocalFrame make_scene_frame(const WorldBox& content, const WorldBox& lights);
 
 /// World-space half-width of the cube.
 inline double frame_half_width(const LocalFrame& frame) { return 1.0 / frame.scale; }

@@ -40,7 +40,7 @@ struct ShadowScene::Impl {
   SceneStats stats;
   std::vector<StoredMesh> meshes;  // by increasing id
   std::uint32_t next_id = 0;
-  WorldBox extension;
+  WorldBox extension, lights;  // what extend() was given: points, and lights
 
   bool committed = true;
   bool laid_out = true;           // the arrays below have the meshes in their places
@@ -48,8 +48,9 @@ struct ShadowScene::Impl {
   bool tree_is_current = true;    // `tree` has all triangles
   bool tree_is_placed = true;     // and where they are
 
-  Scene attributes;  // materials, maps, texture coordinates; no positions
-  LatticeMesh mesh;  // all meshes, one behind the other
+  Scene attributes;             // materials, maps, texture coordinates; no positions
+  LatticeMesh mesh;             // all meshes, one behind the other
+  double reach = kLatticeUnit;  // as GBuffer::reach: power of two, at least every |coordinate| of the meshes
   ClosedComponents closed;
   BlockerTree tree;  // order and topology; boxes belong to lights, and so to workspaces
   double built_cost = 0.0;

@@ -184,16 +184,25 @@ void ShadowScene::set_transform(std::uint32_t mesh, const Transform& transform) 
   stored.rounded = impl_->committed = false;
 }
 
-void ShadowScene::extend(const PointView& points_world) {
+namespace {
+
+/// Does `box` grow?
+bool widen(const PointView& points_world, WorldBox& box) {
   const FpEnvironment environment;
-  WorldBox box = impl_->extension;
+  const WorldBox before = box;
   box.add(box_of(points_world, Transform{}));
-  if (box == impl_->extension) return;
-  impl_->extension = box;
-  impl_->committed = false;
+  return !(box == before);
 }
 
-void ShadowScene::extend(const Light& light) { extend(PointView(light_extent(light))); }
+}  // namespace
+
+void ShadowScene::extend(const PointView& points_world) {
+  if (widen(points_world, impl_->extension)) impl_->committed = false;
+}
+
+void ShadowScene::extend(const Light& light) {
+  if (widen(PointView(light_extent(light)), impl_->lights)) impl_->committed = false;
+}
 
 void ShadowScene::commit(const Execution& execution) {
   run_call(execution, [&] { commit_scene(*impl_); });

@@ -111,13 +111,16 @@ KeptLight& keep_light(const Call& call, std::size_t index) {
   KeptLight& kept = place_of(call, index);
   const bool same = is_kept(call, index);
   if (!same) {
+    const SampleKey key = key_of(call);
+    if (!(kept.filled && kept.key == key)) {  // weights go by the samples' places within the light
+      kept.weights.clear();
+      kept.image.rgb.clear();
+    }
     kept.filled = kept.prepared = false;
     ShadowConfig config = call.config;
     config.frame = call.frame;
-    kept.samples = make_light_samples(call.lights[index], config, call.scene.mesh.frame);
-    kept.weights.clear();
-    kept.image.rgb.clear();
-    kept.key = key_of(call);
+    kept.samples = make_light_samples(call.lights[index], config, call.scene.mesh.frame, std::move(kept.samples));
+    kept.key = key;
     copy_geometry(call.lights[index], kept.light);
     kept.filled = true;
   }

@@ -46,8 +46,9 @@ struct KernelSamples {
 
 enum class SampleOrder { kNeighboursTogether, kAsGiven };
 
+/// `reuse` gives its memory.
 KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound,
-                                  SampleOrder order = SampleOrder::kNeighboursTogether);
+                                  SampleOrder order = SampleOrder::kNeighboursTogether, KernelSamples reuse = {});
 
 /// Lets front faces of closed components be skipped where that is certified to change no bit.
 void use_certificate(const ClosedComponents& closed, KernelSamples& samples);

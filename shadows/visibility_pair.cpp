@@ -6,6 +6,7 @@
 
 #include <glm/vector_relational.hpp>
 
+#include "rasterizer/core/reuse.h"
 #include "shadows/closed_components.h"
 #include "shadows/light_view.h"
 
@@ -44,6 +45,20 @@ void group_neighbours(const LightSamples& samples, std::size_t first, std::size_
   group_neighbours(samples, first + middle, count - middle, order);
 }
 
+/// KernelSamples::order: first [set][sample] packed, then moved apart from the last set on, with padding.
+void order_samples(const LightSamples& samples, SampleOrder sample_order, KernelSamples& kernel) {
+  std::vector<std::uint32_t>& order = kernel.order;
+  order.resize(std::size_t{samples.sets} * samples.count);
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i % samples.count);
+  if (sample_order == SampleOrder::kNeighboursTogether) group_neighbours(samples, 0, samples.count, order);
+  order.resize(std::size_t{samples.sets} * kernel.padded);
+  for (std::size_t set = samples.sets; set-- > 0;) {
+    std::uint32_t *from = order.data() + set * samples.count, *to = order.data() + set * kernel.padded;
+    std::copy_backward(from, from + samples.count, to + samples.count);
+    std::fill(to + samples.count, to + kernel.padded, to[samples.count - 1]);
+  }
+}
+
 /// Bounding boxes of the groups, in offsets from the light's centre; widened so that float rounding cannot shrink them.
 void add_groups(KernelSamples& kernel) {
   const std::uint32_t groups = kernel.padded / KernelSamples::kGroup;
@@ -67,26 +82,26 @@ void add_groups(KernelSamples& kernel) {
 
 }  // namespace
 
-KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound, SampleOrder sample_order) {
+KernelSamples make_kernel_samples(const LightSamples& samples, const LightBound& bound, SampleOrder sample_order,
+                                  KernelSamples reuse) {
   KernelSamples kernel;
+  kernel.order = emptied(reuse.order), kernel.points = emptied(reuse.points), kernel.valid = emptied(reuse.valid);
+  kernel.closed_usable = emptied(reuse.closed_usable);
+  kernel.x = emptied(reuse.x), kernel.y = emptied(reuse.y), kernel.z = emptied(reuse.z);
+  kernel.group_x = emptied(reuse.group_x), kernel.group_y = emptied(reuse.group_y);
+  kernel.group_z = emptied(reuse.group_z), kernel.half_x = emptied(reuse.half_x);
+  kernel.half_y = emptied(reuse.half_y), kernel.half_z = emptied(reuse.half_z);
   kernel.count = samples.count;
   kernel.padded = (samples.count + 63) / 64 * 64;
   kernel.sets = samples.sets;
   kernel.center = bound.center;
-  std::vector<std::uint32_t> grouped(std::size_t{samples.sets} * samples.count);  // [set][sample]
-  for (std::size_t i = 0; i < grouped.size(); ++i) grouped[i] = static_cast<std::uint32_t>(i % samples.count);
-  if (sample_order == SampleOrder::kNeighboursTogether) group_neighbours(samples, 0, samples.count, grouped);
-  for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    const auto begin = grouped.begin() + static_cast<std::ptrdiff_t>(std::size_t{set} * samples.count);
-    std::vector<std::uint32_t> order(begin, begin + static_cast<std::ptrdiff_t>(samples.count));
-    order.resize(kernel.padded, order.back());
-    kernel.order.insert(kernel.order.end(), order.begin(), order.end());
-    for (const std::uint32_t i : order) {
-      const vec3 point = samples.set(set)[i], offset = point - bound.center;
-      kernel.points.push_back(point);
-      kernel.x.push_back(offset.x), kernel.y.push_back(offset.y), kernel.z.push_back(offset.z);
-      kernel.reach = std::max(kernel.reach, norm_max(offset));
-    }
+  order_samples(samples, sample_order, kernel);
+  for (std::size_t i = 0; i < kernel.order.size(); ++i) {
+    const vec3 point = samples.set(static_cast<std::uint32_t>(i / kernel.padded))[kernel.order[i]];
+    const vec3 offset = point - bound.center;
+    kernel.points.push_back(point);
+    kernel.x.push_back(offset.x), kernel.y.push_back(offset.y), kernel.z.push_back(offset.z);
+    kernel.reach = std::max(kernel.reach, norm_max(offset));
   }
   add_groups(kernel);
   for (int k = 0; k < 3; ++k) kernel.half_axes[k] = vec3(bound.half_axes[k] * (1.0 + 0x1p-20));

@@ -1,16 +1,23 @@
 /* halfshade from C: the embedding interface of shadow_scene.h and shadow_solver.h, which say what the calls mean.
  *
- * Status     every function that can fail returns a halfshade_status and writes its outputs only when that is
- *            HALFSHADE_OK; a call that was cancelled may have written some of them. The context keeps the message of
- * its last call, which names the argument at fault. Contexts   say how calls run and keep the message. One thread at a
- * time may use a context; objects belong to none, so that several threads, each with a context and a workspace of its
- * own, may share a scene and a solver. Structs    that may grow start with struct_size. Begin with the
- * HALFSHADE_..._INIT macro, which sets it and the defaults. Bytes of a struct that this version of the library does not
- * know must be zero. Arrays     pointer, count, and distance in bytes from one element to the next (0 = packed). Read
- * during the call, not kept after it. Nothing may count more than 2^31 - 1 elements. Handles    are made by ..._create
- * and freed by ..._destroy, which takes their address and makes them NULL. A NULL handle, or a handle of another kind,
- * is HALFSHADE_ERROR_USAGE; ..._destroy ignores it. Callbacks  must return: neither longjmp nor a C++ exception may
- * leave them. They must not use the context of the call that they serve.
+ * Status: every function that can fail returns a halfshade_status and writes its outputs only when that is
+ * HALFSHADE_OK; a call that was cancelled may have written some of them. The context keeps the message of its last
+ * call, which names the argument at fault.
+ *
+ * Contexts say how calls run and keep the message. One thread at a time may use a context; objects belong to none, so
+ * that several threads, each with a context and a workspace of its own, may share a scene and a solver.
+ *
+ * Structs that may grow start with struct_size. Begin with the HALFSHADE_..._INIT macro, which sets it and the
+ * defaults. Bytes of a struct that this version of the library does not know must be zero.
+ *
+ * Arrays: pointer, count, and distance in bytes from one element to the next (0 = packed). Read during the call, not
+ * kept after it. Nothing may count more than 2^31 - 1 elements.
+ *
+ * Handles are made by ..._create and freed by ..._destroy, which takes their address and makes them NULL. A NULL
+ * handle, or a handle of another kind, is HALFSHADE_ERROR_USAGE; ..._destroy ignores it.
+ *
+ * Callbacks must return: neither longjmp nor a C++ exception may leave them. They must not use the context of the call
+ * that they serve.
  */
 #ifndef HALFSHADE_C_API_H
 #define HALFSHADE_C_API_H
@@ -119,7 +126,8 @@ typedef enum halfshade_light_shape {
   HALFSHADE_LIGHT_SPHERE = 3,    /* center, radius */
   HALFSHADE_LIGHT_SAMPLES = 4,   /* points: explicit sample positions */
   HALFSHADE_LIGHT_ELLIPSOID = 5, /* center, axes: half-axis vectors */
-  HALFSHADE_LIGHT_POLYGON = 6    /* points: corners of a flat, convex polygon */
+  HALFSHADE_LIGHT_POLYGON = 6,   /* points: corners of a flat, convex polygon */
+  HALFSHADE_LIGHT_SUN = 7        /* normal: the way its light travels, angular_diameter_deg; for halfshade_place_sun */
 } halfshade_light_shape;
 
 typedef struct halfshade_light {
@@ -133,16 +141,19 @@ typedef struct halfshade_light {
   /* RECTANGLE: replaces emission unless NULL; [height][width][3] linear RGB, row 0 is the edge at +v / 2. */
   const float* emission_image;
   uint32_t image_width, image_height;
+  double angular_diameter_deg; /* SUN: 0 < angle <= 60 */
 } halfshade_light;
 #define HALFSHADE_LIGHT_INIT                                                                                    \
   {                                                                                                             \
     .struct_size = sizeof(halfshade_light), .shape = HALFSHADE_LIGHT_RECTANGLE, .u = {1, 0, 0}, .v = {0, 0, 1}, \
-    .normal = {0, -1, 0}, .axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .emission = {                              \
-      1,                                                                                                        \
-      1,                                                                                                        \
-      1                                                                                                         \
-    }                                                                                                           \
+    .normal = {0, -1, 0}, .axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, .emission = {1, 1, 1},                     \
+    .angular_diameter_deg = 0.533                                                                               \
   }
+
+/* The sun of a scene between `low` and `high` (world space): a disk far away. Lights of other shapes stay as they are.
+ * Set placed->struct_size before; `placed` may be `sun`. */
+HALFSHADE_API halfshade_status halfshade_place_sun(halfshade_context* context, const halfshade_light* sun,
+                                                   const double low[3], const double high[3], halfshade_light* placed);
 
 /* ---- Scenes: shadow_scene.h ---- */
 
@@ -205,7 +216,7 @@ HALFSHADE_API halfshade_status halfshade_scene_set_positions(halfshade_context* 
                                                              uint32_t mesh, const halfshade_points* positions);
 HALFSHADE_API halfshade_status halfshade_scene_set_transform(halfshade_context* context, halfshade_scene* scene,
                                                              uint32_t mesh, const double* transform /* 12: rows */);
-/* Where receivers or lights will be that lie far from all meshes; world space. */
+/* Where meshes, receivers or lights will be that lie far from all meshes now; world space. */
 HALFSHADE_API halfshade_status halfshade_scene_extend_points(halfshade_context* context, halfshade_scene* scene,
                                                              const halfshade_points* points);
 HALFSHADE_API halfshade_status halfshade_scene_extend_light(halfshade_context* context, halfshade_scene* scene,
@@ -242,17 +253,20 @@ typedef struct halfshade_workspace_desc {
 #define HALFSHADE_WORKSPACE_INIT \
   { .struct_size = sizeof(halfshade_workspace_desc), .kept_lights = 1 }
 
+/* As far as rounding asks for, and as the receivers of a G-buffer. */
+#define HALFSHADE_DEFAULT_LIFT (-1.0)
+
 typedef struct halfshade_receivers {
   size_t struct_size;
   halfshade_points positions;          /* world space */
   halfshade_points normals;            /* geometric, on the side that is asked, of any length; or empty */
   halfshade_indices meshes, triangles; /* own triangle: numbers, or HALFSHADE_NONE; both empty: none has one */
-  double lift;                         /* along the normals, in half-widths of the local frame */
+  double lift;                         /* along the normals, in half-widths of the local frame, or DEFAULT_LIFT */
   uint32_t first;                      /* number of receiver 0, from which sets of light samples are chosen */
   uint32_t frame;                      /* instead of the solver's, unless HALFSHADE_NONE */
 } halfshade_receivers;
 #define HALFSHADE_RECEIVERS_INIT \
-  { .struct_size = sizeof(halfshade_receivers), .lift = 1.0 / 2097152, .frame = HALFSHADE_NONE }
+  { .struct_size = sizeof(halfshade_receivers), .lift = HALFSHADE_DEFAULT_LIFT, .frame = HALFSHADE_NONE }
 
 /* Each array is NULL (not wanted) or has exactly as many elements as stated; the counts are there to be checked. */
 typedef struct halfshade_output {

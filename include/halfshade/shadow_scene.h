@@ -55,10 +55,11 @@ struct MeshTriangle {
 /// Blockers in world space. Changes are noted and checked at once, and done together by commit().
 ///
 /// Rounding. All positions are rounded to the lattice of one local frame (docs/decisions/0001 and 0003). The frame is a
-/// pure function of the scene's content: of the box around all meshes and all that was given to extend(). It is chosen
-/// with room to spare, so that it stays the same while things move. Lights and receivers must lie within its reach(),
-/// which is a cube at least twice as wide as that box; extend() makes it wider. Equal content gives equal bits,
-/// whatever changes led to it.
+/// pure function of the scene's content: of the box around all meshes and the points given to extend(), in whose middle
+/// it is finest, and of the lights given to extend(). It is chosen with room to spare, so that it stays the same while
+/// things move. Lights and receivers must lie within its reach(), which is a cube at least twice as wide as that box
+/// and twice as wide as the lights need; extend() makes it wider. Equal content gives equal bits, whatever changes led
+/// to it.
 ///
 /// Threads: const member functions may run concurrently with each other and with solves; others may not run
 /// concurrently with anything on the same scene. Errors are thrown before anything changes, std::bad_alloc as well; a
@@ -86,10 +87,10 @@ class HALFSHADE_API ShadowScene {
   /// Another place for the mesh. Throws Error{kBadInput} for values that are not finite.
   void set_transform(std::uint32_t mesh, const Transform& transform);
 
-  /// Widens the box that the frame is made for: where lights and receivers will be that lie far from all meshes. It
+  /// Widens the box that the frame is made for: where meshes and receivers will be that are far from all meshes now. It
   /// never shrinks. Throws Error{kBadInput} for positions that are not finite.
   void extend(const PointView& points_world);
-  /// The same for all of a light.
+  /// Makes the frame reach all of a light, however far it is: the scene stays in its middle.
   void extend(const Light& light);
 
   /// Does all that changed. Costs nothing when nothing did. Throws Error{kCancelled} and what `execution` throws.

@@ -7,9 +7,13 @@
 
 namespace halfshade {
 
-/// Distance by which receivers with normals are lifted off their surface by default, in half-widths of the local frame:
-/// 4 units in the last place of a float coordinate.
-inline constexpr double kReceiverLift = 0x1p-21;
+/// Distance by which receivers are lifted off their surface, in half-widths of the local frame: 4 units in the last
+/// place of a float coordinate of size 1. Where far lights make the scene small in its frame, kReceiverLiftOfScene
+/// times the power of two from the meshes' largest coordinate on is less, and is taken.
+inline constexpr double kReceiverLift = 0x1p-21, kReceiverLiftOfScene = 0x1p-18;
+
+/// ReceiverView::lift: as above, and as the receivers of a G-buffer.
+inline constexpr double kDefaultLift = -1.0;
 
 /// Points that ask for light, in the caller's memory.
 struct ReceiverView {
@@ -21,7 +25,8 @@ struct ReceiverView {
   /// Own triangle, which never blocks the receiver: number of the mesh, and of the triangle in it; kNone = none. Both
   /// empty: none has one.
   IndexView meshes = {}, triangles = {};
-  double lift = kReceiverLift;  // 0..1; counts for nothing without normals
+  /// Along the normals, in half-widths of the local frame, 0..1; or kDefaultLift. Counts for nothing without normals.
+  double lift = kDefaultLift;
   /// Number of receiver 0, from which sets of light samples are chosen (ShadowConfig::sample_sets): a part of the
   /// receivers gets the same samples as in a call for all of them.
   std::uint32_t first = 0;
@@ -54,15 +59,16 @@ struct SolveStats : ShadowStats {
 /// What a workspace keeps between calls.
 struct WorkspaceConfig {
   /// Lights whose samples and tree (about 220 bytes per triangle) are kept from call to call, 1..256. Light number i of
-  /// a call uses place i modulo this: what was there before is replaced.
+  /// a call uses place i modulo this: what was there before is replaced. So of more lights than places, those that
+  /// share theirs with no other light of the call are kept.
   std::uint32_t kept_lights = 1;
 };
 
 /// Scratch memory of one call at a time, and what can be kept between calls. Method `exact` allocates nothing in a call
-/// that follows others with as many receivers, a scene whose meshes moved but are the same, and flat lights (rectangle,
-/// disk, polygon) whose geometry is the same and that all have a place here. Lists grow to the longest that was needed,
-/// so that the first frames of a movement may still allocate. A light that moves has its samples made anew. Lights that
-/// are not flat, receivers in the plane of a light, and other methods allocate as they need.
+/// that follows others with as many receivers, a scene whose meshes are the same, and flat lights of the same shapes
+/// that all have a place here. Meshes may have moved, rectangles and disks too; polygons that move and Poisson disks
+/// allocate. Lists grow to the longest that was needed, so that the first frames of a movement may still allocate.
+/// Lights that are not flat, receivers in the plane of a light, and other methods allocate as they need.
 /// Distinct Workspaces may be used concurrently; one Workspace may not: a call that finds it in use throws
 /// Error{kUsage}.
 class HALFSHADE_API Workspace {
@@ -100,7 +106,8 @@ class HALFSHADE_API ShadowSolver {
   explicit ShadowSolver(const ShadowConfig& config = {});
   const ShadowConfig& config() const { return config_; }  // as given
 
-  /// Number of samples of a light: config().light_sample_count, 1 for points, their number for explicit samples.
+  /// Number of samples of a light: config().light_sample_count, 1 for points, their number for explicit samples. Throws
+  /// what solve() throws when explicit samples are none or too many; so does mask_words().
   std::uint32_t sample_count(const Light& light) const;
   /// 64-bit words per receiver and light that hold the masks of any of these lights.
   std::size_t mask_words(std::span<const Light> lights) const;

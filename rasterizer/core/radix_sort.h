@@ -28,7 +28,8 @@ void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, s
   constexpr int kDigitBits = RadixCounts::kDigitBits;
   constexpr std::size_t kDigits = RadixCounts::kDigits, kPart = RadixCounts::kPart;
   const std::size_t parts = (items.size() + kPart - 1) / kPart;
-  auto& [counts, offsets] = kept;
+  std::vector<std::uint32_t>& counts = kept.counts;  // not a structured binding: Clang before 16 cannot capture one
+  std::vector<std::uint32_t>& offsets = kept.offsets;
   scratch.resize(items.size());
   for (int shift = 0; shift < 32 && ((key_end - (key_end != 0)) >> shift) != 0; shift += kDigitBits) {
     const auto digit = [&](const Item& item) { return std::size_t{key(item) >> shift} & (kDigits - 1); };

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "halfshade/error.h"
+#include "rasterizer/io/exr_header.h"
 #include "rasterizer/io/input_file.h"
 
 namespace halfshade {
@@ -159,6 +160,7 @@ class Decoder {
     if (format.empty()) throw error("is not a PNG, JPEG or EXR picture, the only kinds allowed");
     if (format == "png" && !is_whole_png(bytes)) throw error("PNG is truncated or damaged");
     if (format == "jpeg" && !is_whole_jpeg(bytes)) throw error("JPEG is truncated or damaged");
+    if (format == "openexr" && !has_credible_exr_header(bytes)) throw error("EXR is truncated or damaged");
     OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
     const auto input = open(format, memory);
     check_spec(input->spec());

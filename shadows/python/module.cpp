@@ -145,6 +145,17 @@ void bind_lights(py::module_& m) {
           },
           "points"_a, py::kw_only(), "two_sided"_a = false, "emission"_a = white)
       .def_static(
+          "sun",
+          [](const py::object& direction, const py::object& low, const py::object& high, double angular_diameter_deg,
+             const py::object& emission) {
+            Light light = flat_light(LightShape::kSun, false, emission);
+            light.normal = to_point(direction, "direction");
+            light.angular_diameter_deg = angular_diameter_deg;
+            return place_sun(light, to_point(low, "low"), to_point(high, "high"));
+          },
+          "direction"_a, "low"_a, "high"_a, py::kw_only(), "angular_diameter_deg"_a = Light().angular_diameter_deg,
+          "emission"_a = white)
+      .def_static(
           "samples",
           [](const py::object& points, const py::object& emission) {
             Light light = flat_light(LightShape::kSamples, false, emission);
@@ -362,7 +373,7 @@ struct Receivers {
 
 /// `values`: points, or a G-buffer, which brings all that is in the keywords.
 Receivers to_receivers(const py::object& values, const py::object& normals, const py::object& meshes,
-                       const py::object& triangles, double lift, std::uint32_t first,
+                       const py::object& triangles, std::optional<double> lift, std::uint32_t first,
                        std::optional<std::uint32_t> frame) {
   Receivers receivers;
   if (py::isinstance<PyGBuffer>(values)) {
@@ -381,7 +392,7 @@ Receivers to_receivers(const py::object& values, const py::object& normals, cons
   receivers.view.normals = keep(to_points(normals, "normals"));
   receivers.view.meshes = keep(to_indices(meshes, "meshes"));
   receivers.view.triangles = keep(to_indices(triangles, "triangles"));
-  receivers.view.lift = lift;
+  receivers.view.lift = lift.value_or(kDefaultLift);
   receivers.view.first = first;
   receivers.view.frame = frame.value_or(kNone);
   receivers.shape = {static_cast<py::ssize_t>(receivers.view.positions.count)};
@@ -405,8 +416,8 @@ py::dict solve(const ShadowSolver& solver, PyScene& scene, const py::object& rec
                const py::object& light_values, PyWorkspace& workspace, const py::object& want_masks,
                const py::object& want_visibility, const py::object& want_irradiance,
                const py::object& want_total_irradiance, const py::object& normals, const py::object& meshes,
-               const py::object& triangles, double lift, std::uint32_t first, std::optional<std::uint32_t> frame,
-               const py::object& progress, bool serial) {
+               const py::object& triangles, std::optional<double> lift, std::uint32_t first,
+               std::optional<std::uint32_t> frame, const py::object& progress, bool serial) {
   bool single = false;
   const std::vector<Light> lights = to_lights(light_values, single);
   const Receivers receivers = to_receivers(receiver_values, normals, meshes, triangles, lift, first, frame);
@@ -483,7 +494,6 @@ PYBIND11_MODULE(_halfshade, m) {
   using namespace halfshade::python;
   m.attr("__version__") = HALFSHADE_VERSION_TEXT;
   m.attr("NONE") = halfshade::kNone;
-  m.attr("RECEIVER_LIFT") = halfshade::kReceiverLift;
   bind_errors(m);
   bind_lights(m);
   bind_scenes(m);

@@ -317,6 +317,52 @@ static void handles_of_another_kind_are_refused(void) {
   tear_down(&f);
 }
 
+static void the_sun_is_a_far_disk(void) {
+  fixture f;
+  set_up(&f, NULL);
+  /* From straight above, the half-plane hides all of the sun from what is left of its edge. */
+  const double low[3] = {-64, 0, -64}, high[3] = {64, 2, 64};
+  const halfshade_light initial = HALFSHADE_LIGHT_INIT;
+  halfshade_light sun = initial;
+  sun.shape = HALFSHADE_LIGHT_SUN;
+  f.light = sun;
+  CHECK_FAILS(solve(&f), HALFSHADE_ERROR_USAGE, "place_sun");
+  CHECK_OK(halfshade_place_sun(f.context, &sun, low, high, &f.light));
+  CHECK(f.light.shape == HALFSHADE_LIGHT_DISK && f.light.center[1] > 100000 && f.light.struct_size == sizeof f.light);
+  const double half_angle = atan(f.light.radius / (f.light.center[1] - 1));
+  CHECK(fabs(2 * half_angle * 57.29577951308232 - 0.533) < 1e-9);
+  CHECK_FAILS(solve(&f), HALFSHADE_ERROR_BAD_INPUT, "reach");
+  CHECK_OK(halfshade_scene_extend_light(f.context, f.scene, &f.light));
+  CHECK_OK(halfshade_scene_commit(f.context, f.scene));
+  CHECK_OK(solve(&f));
+  CHECK(f.visibility[0] == 0.0f && f.visibility[1] > 0.45f && f.visibility[1] < 0.55f && f.visibility[2] == 1.0f);
+
+  halfshade_light placed = initial;
+  CHECK_OK(halfshade_place_sun(f.context, &initial, low, high, &placed));
+  CHECK(memcmp(&placed, &initial, sizeof placed) == 0); /* no sun: as it was */
+  sun.angular_diameter_deg = 61;
+  CHECK_FAILS(halfshade_place_sun(f.context, &sun, low, high, &placed), HALFSHADE_ERROR_BAD_INPUT, "60");
+  CHECK_FAILS(halfshade_place_sun(f.context, &sun, NULL, high, &placed), HALFSHADE_ERROR_USAGE, "low is NULL");
+  CHECK_FAILS(halfshade_place_sun(f.context, &initial, low, high, NULL), HALFSHADE_ERROR_USAGE, "placed is NULL");
+  CHECK(memcmp(&placed, &initial, sizeof placed) == 0);
+  tear_down(&f);
+}
+
+static void lights_without_samples_are_refused(void) {
+  fixture f;
+  set_up(&f, NULL);
+  f.light.shape = HALFSHADE_LIGHT_SAMPLES;
+  uint32_t samples = 7;
+  size_t words = 7;
+  CHECK_FAILS(halfshade_solver_sample_count(f.context, f.solver, &f.light, &samples), HALFSHADE_ERROR_BAD_INPUT,
+              "no sample points");
+  CHECK_FAILS(halfshade_solver_mask_words(f.context, f.solver, &f.light, 1, &words), HALFSHADE_ERROR_BAD_INPUT,
+              "no sample points");
+  CHECK(samples == 7 && words == 7);
+  CHECK_FAILS(solve(&f), HALFSHADE_ERROR_BAD_INPUT, "no sample points");
+  tear_down(&f);
+}
+
 static void wrong_sizes_are_refused(void) {
   fixture f;
   set_up(&f, NULL);
@@ -456,6 +502,8 @@ int main(void) {
   pictures();
   null_handles_are_refused();
   handles_of_another_kind_are_refused();
+  the_sun_is_a_far_disk();
+  lights_without_samples_are_refused();
   wrong_sizes_are_refused();
   counts_beyond_31_bits_are_refused();
   wrong_content_is_named();

@@ -160,7 +160,7 @@ Results solve_in_c(const Content& content, const halfshade_light& light, const h
   receivers.normals = points_of(content.normals);
   receivers.meshes = {content.meshes.data(), kReceivers, 0};
   receivers.triangles = {content.own.data(), kReceivers, 0};
-  receivers.lift = kReceiverLift;
+  receivers.lift = HALFSHADE_DEFAULT_LIFT;
   receivers.frame = HALFSHADE_NONE;
   halfshade_output output = {};
   output.struct_size = sizeof output;

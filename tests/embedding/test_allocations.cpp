@@ -54,6 +54,48 @@ TEST_CASE("frames allocate nothing after warm-up") {
   CHECK(blocked_bits(masks) > 1000);
 }
 
+TEST_CASE("rectangles and disks that move allocate nothing after warm-up, and give the bits of lights that did not") {
+  EmbedScene s(24);
+  const Ground ground(48);
+  Light disk = frame_light();
+  disk.shape = LightShape::kDisk, disk.center = {1.0, 3.5, 0.5}, disk.normal = {0.1, -1.0, 0.0}, disk.radius = 0.7;
+  Light both = frame_light();
+  both.two_sided = true, both.center.y = 1.3;
+  Light picture = frame_light();
+  picture.emission_image = {"stripes", 2, 1, {vec3(1, 0, 0), vec3(0, 0, 2)}};
+  const std::vector<Light> first = {frame_light(), disk, both, picture};
+  std::vector<Light> lights = first;
+  for (const bool rotate : {false, true}) {
+    const ShadowSolver solver({.light_sample_count = 100, .sample_sets = 3, .rotate_sets = rotate});
+    Workspace workspace({.kept_lights = 4});
+    const std::size_t all = ground.positions.size() * lights.size();
+    std::vector<std::uint64_t> masks(all * solver.mask_words(lights));
+    std::vector<float> visibility(all);
+    std::vector<vec3> irradiance(all), total(ground.positions.size());
+    Execution serial;
+    serial.executor = Executor::kSerial;
+    const auto frame = [&](int f) {
+      for (std::size_t i = 0; i < lights.size(); ++i) {
+        lights[i].center = first[i].center + dvec3(0.05 * (f % 7), -0.03 * (f % 5), 0.02 * (f % 3));
+        lights[i].normal = first[i].normal + dvec3(0.0, 0.0, 0.02 * (f % 4));
+        lights[i].u = first[i].u + dvec3(0.0, 0.01 * (f % 2), 0.0);
+      }
+      solver.solve(s.scene, ground.view(), lights, workspace, {masks, visibility, irradiance, total}, serial);
+    };
+    for (int f = 0; f < 8; ++f) frame(f);
+    const std::uint64_t before = allocations_now().count;
+    for (int f = 8; f < 16; ++f) frame(f);
+    const std::uint64_t allocated = allocations_now().count - before;
+    CHECK(allocated == 0);
+    CHECK(workspace.stats().lights_made == 4);
+    Workspace fresh;
+    const Solved anew = solve(solver, s.scene, ground.view(), lights, fresh, serial);
+    CHECK(anew.masks == masks);
+    CHECK(anew.irradiance == irradiance);
+    CHECK(blocked_bits(masks) > 1000);
+  }
+}
+
 TEST_CASE("clear gives the memory back, and so do scenes and workspaces that end") {
   const std::int64_t before = allocations_now().live;
   {

@@ -3,6 +3,7 @@
 #include "halfshade/c_api.h"
 
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "fuzz/coordinates.h"
@@ -235,7 +236,8 @@ class Host {
 
   halfshade_light light() {
     halfshade_light light = HALFSHADE_LIGHT_INIT;
-    light.shape = static_cast<halfshade_light_shape>(in_.broken() ? 7 : in_.below(7));  // 7 is none
+    const std::uint32_t shape = in_.broken() ? 8 : in_.below(8);  // 8 is none
+    std::memcpy(&light.shape, &shape, sizeof shape);
     light.two_sided = in_.flag();
     light_points_ = points(5);
     light.points = view_of(light_points_);
@@ -244,7 +246,15 @@ class Host {
     put(in_.point(), light.u), put(in_.point(), light.v), put(in_.point(), light.normal);
     for (int k = 0; k < 3; ++k) put(in_.point(), light.axes[k]);
     light.radius = in_.coordinate();
+    if (shape == HALFSHADE_LIGHT_SUN && in_.flag()) place(light);
     return light;
+  }
+
+  void place(halfshade_light& sun) {
+    const dvec3 low = in_.point(), high = in_.point();
+    sun.angular_diameter_deg = in_.coordinate();
+    if (!ok(halfshade_place_sun(context_, &sun, &low.x, &high.x, &sun))) return;
+    require(sun.shape == HALFSHADE_LIGHT_DISK && sun.radius >= 0.0, "a placed sun is a disk");
   }
 
   /// Masks of `receivers`, if the call is accepted.
@@ -252,8 +262,7 @@ class Host {
                 const halfshade_receivers& receivers, const halfshade_light& light, Masks& masks) {
     std::size_t words = 0;
     if (!ok(halfshade_solver_mask_words(context_, solver, &light, 1, &words))) return false;
-    require(words <= 64, "no light has more than 4096 samples");
-    if (words == 0) return false;  // a light of no samples
+    require(words >= 1 && words <= 64, "lights have 1 to 4096 samples");
     masks.assign(words * receivers.positions.count, ~std::uint64_t{0});
     halfshade_output output = HALFSHADE_OUTPUT_INIT;
     output.masks = masks.data(), output.mask_count = masks.size();

@@ -45,8 +45,8 @@ std::string exr_attribute(const std::string& name, const std::string& type, cons
   return name + '\0' + type + '\0' + little_endian(static_cast<std::uint32_t>(value.size())) + value;
 }
 
-// Scanline EXR with one half channel, no compression and an empty body.
-std::string exr_bomb(std::uint32_t width, std::uint32_t height) {
+// Scanline EXR with one half channel, no compression and an empty body; `more` are further attributes.
+std::string exr_bomb(std::uint32_t width, std::uint32_t height, const std::string& more = "") {
   const std::string window = little_endian(0) + little_endian(0) + little_endian(width - 1) + little_endian(height - 1);
   const std::string channel =
       std::string("R\0", 2) + little_endian(1) + std::string(4, '\0') + little_endian(1) + little_endian(1) + '\0';
@@ -56,7 +56,7 @@ std::string exr_bomb(std::uint32_t width, std::uint32_t height) {
          exr_attribute("lineOrder", "lineOrder", std::string(1, '\0')) +
          exr_attribute("pixelAspectRatio", "float", little_endian(0x3f800000)) +
          exr_attribute("screenWindowCenter", "v2f", std::string(8, '\0')) +
-         exr_attribute("screenWindowWidth", "float", little_endian(0x3f800000)) + '\0';
+         exr_attribute("screenWindowWidth", "float", little_endian(0x3f800000)) + more + '\0';
 }
 
 test::Outcome decode(const std::filesystem::path& file) {
@@ -83,6 +83,24 @@ TEST_CASE("S38 image_bombs: headers that promise gigabytes are refused at once a
   check_bomb(std::string("\x00\x00\x02\x00\x00\x00\x00\x00\x00\x00\x00\x00\xff\xff\xff\xff\x20\x00", 18));  // TGA
   for (const std::uint32_t side : {16000u, 30000u, 32768u, 40000u, 0x7fffffffu, 0x80000000u, 0u})
     check_bomb(exr_bomb(side, side));
+}
+
+TEST_CASE(
+    "S38 image_bombs: EXR attributes that claim to be longer than the file are refused before memory is set aside") {
+  const std::string gigabyte = little_endian(1u << 30);
+  const std::string name_and = std::string("extra\0", 6);
+  for (const char* type : {"opaque", "string", "floatvector"}) {
+    const std::string claim = name_and + type + '\0' + gigabyte + "x";
+    CAPTURE(type);
+    const Scratch scratch;
+    CHECK(decode(scratch.write("bomb", exr_bomb(4, 4, claim))).has("EXR is truncated or damaged"));
+    check_bomb(exr_bomb(4, 4, claim));
+  }
+  check_bomb(exr_bomb(4, 4, exr_attribute("extra", "stringvector", gigabyte + "x")));
+  check_bomb(exr_bomb(4, 4, exr_attribute("extra", "preview", little_endian(16000) + little_endian(16000))));
+  // OpenEXR reads four bytes here whatever the length says, and takes what follows for the next attribute.
+  check_bomb(
+      exr_bomb(4, 4, exr_attribute("extra", "int", std::string(4, '\0') + name_and + "opaque" + '\0' + gigabyte)));
 }
 
 TEST_CASE("S38 image_bombs: a bomb as texture stops the loading") {

@@ -85,6 +85,26 @@ class Values(unittest.TestCase):
             self.assertEqual((visibility[0], visibility[2]), (0.0, 1.0))
             self.assertAlmostEqual(float(visibility[1]), 0.5, delta=0.1)
 
+    def test_the_sun(self):
+        sun = hs.Light.sun((0, -1, 0), (-64, 0, -64), (64, 2, 64), angular_diameter_deg=2)
+        self.scene.extend(sun)
+        self.scene.commit()
+        visibility = self.solver.visibility(self.scene, RECEIVERS, sun)
+        self.assertEqual((visibility[0], visibility[2]), (0.0, 1.0))
+        self.assertAlmostEqual(float(visibility[1]), 0.5, delta=0.05)
+        with self.assertRaisesRegex(hs.BadInputError, "60"):
+            hs.Light.sun((0, -1, 0), (0, 0, 0), (1, 1, 1), angular_diameter_deg=61)
+
+    def test_lift(self):
+        # On the plate's underside with its normal: only what lifts through the plate sees the light.
+        below, normal = np.array([(-32, 1.999, 0)]), np.array([(0, 1, 0)])
+        lifts = (None, 0, 1e-3)  # of 128
+        seen = [self.solver.visibility(self.scene, below, square(), normals=normal, lift=lift)[0] for lift in lifts]
+        self.assertEqual(seen[:2], [0.0, 0.0])
+        self.assertGreater(seen[2], 0.0)
+        with self.assertRaisesRegex(hs.UsageError, "lift"):
+            self.solver.visibility(self.scene, below, square(), normals=normal, lift=-0.5)
+
     def test_irradiance(self):
         normals = np.tile(np.float32([0, 1, 0]), (3, 1))
         result = self.solver.solve(

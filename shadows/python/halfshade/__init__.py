@@ -23,7 +23,6 @@ import numpy as np
 from . import _halfshade
 from ._halfshade import (
     NONE,
-    RECEIVER_LIFT,
     BadInputError,
     CancelledError,
     Error,
@@ -39,7 +38,6 @@ from ._halfshade import (
 
 __all__ = [
     "NONE",
-    "RECEIVER_LIFT",
     "BadInputError",
     "CancelledError",
     "Error",
@@ -86,7 +84,7 @@ class Solver(_halfshade.BaseSolver):
         normals=None,
         meshes=None,
         triangles=None,
-        lift=RECEIVER_LIFT,
+        lift=None,
         first=0,
         frame=None,
         workspace=None,

@@ -6,8 +6,6 @@ import numpy.typing as npt
 __version__: str
 NONE: int
 """No such number: a receiver without a triangle of its own, a pixel without a triangle."""
-RECEIVER_LIFT: float
-"""Default distance by which receivers with normals are lifted, in half-widths of the local frame."""
 
 _Progress = Optional[Callable[[float], Any]]
 """Called with the share done, 0..1, now and then; a false result raises CancelledError."""
@@ -54,6 +52,16 @@ class Light:
     def ellipsoid(center: npt.ArrayLike, axes: Sequence[npt.ArrayLike], *, emission: npt.ArrayLike = ...) -> Light: ...
     @staticmethod
     def polygon(points: npt.ArrayLike, *, two_sided: bool = ..., emission: npt.ArrayLike = ...) -> Light: ...
+    @staticmethod
+    def sun(
+        direction: npt.ArrayLike,
+        low: npt.ArrayLike,
+        high: npt.ArrayLike,
+        *,
+        angular_diameter_deg: float = ...,
+        emission: npt.ArrayLike = ...,
+    ) -> Light:
+        """The sun of a scene between two corners, as a disk far away; `direction` is the way its light travels."""
     @staticmethod
     def samples(points: npt.ArrayLike, *, emission: npt.ArrayLike = ...) -> Light: ...
 
@@ -169,7 +177,7 @@ class Solver:
         normals: Optional[npt.ArrayLike] = ...,
         meshes: Optional[npt.ArrayLike] = ...,
         triangles: Optional[npt.ArrayLike] = ...,
-        lift: float = ...,
+        lift: Optional[float] = ...,
         first: int = ...,
         frame: Optional[int] = ...,
         workspace: Optional[Workspace] = ...,
@@ -178,7 +186,9 @@ class Solver:
     ) -> Result:
         """Shapes: masks [light, receiver, word] uint64, bit i of word i // 64 set where sample i is hidden (or uint8
         bytes); visibility [light, receiver] float32; irradiance [light, receiver, 3]; total_irradiance [receiver, 3].
-        [light] is left out for a single Light; [receiver] is [height, width] for a G-buffer."""
+        [light] is left out for a single Light; [receiver] is [height, width] for a G-buffer. `lift` is the distance by
+        which receivers with normals are lifted off their surface, in half-widths of the local frame; None: as far as
+        rounding asks for."""
     def masks(
         self,
         scene: Scene,
