@@ -45,6 +45,10 @@ std::uint32_t Roughness(const RunMeter& meter, const RunMeter::Words& mask) {
     right[i] = (mask[i] ^ mask[i] >> 1) & meter.not_last;
     differ += Count(down[i]) + Count(right[i]);
   }
+  std::uint32_t alone = 0;  // samples unlike both neighbours of a row, or of a column
+  for (std::size_t i = 0; i < meter.words; ++i) {
+    alone += Count(right[i] & right[i] >> 1 & meter.not_last) + Count(down[i] & Below(meter, down, i));
+  }
   const auto along_row = [&](std::uint64_t z, std::uint64_t, std::size_t) { return z >> 1 & meter.not_last; };
   const auto forwards = [&](std::uint64_t, std::uint64_t z, std::size_t i) {
     return (z & ~meter.wraps[i]) | (z >> 1 & meter.not_last & meter.wraps[i]);
@@ -52,7 +56,7 @@ std::uint32_t Roughness(const RunMeter& meter, const RunMeter::Words& mask) {
   const auto backwards = [&](std::uint64_t, std::uint64_t z, std::size_t i) {
     return (z & meter.wraps[i]) | ((z & meter.not_last) << 1 & ~meter.wraps[i]);
   };
-  return std::max({differ, SquaredRuns(meter, down, along_row), SquaredRuns(meter, right, forwards),
+  return std::max({differ + 4 * alone, SquaredRuns(meter, down, along_row), SquaredRuns(meter, right, forwards),
                    SquaredRuns(meter, right, backwards)});
 }
 
