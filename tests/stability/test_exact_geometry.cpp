@@ -324,7 +324,7 @@ std::array<vec3, 4> coplanar(Random& random) {
 /// `count` determinants for each filter of the ladder; then how many an ordinary scene leaves undecided.
 void check_filters(std::size_t count) {
   struct {
-    const char* name;
+    std::string name;
     Filtered in_float, in_double;
   } sets[] = {
       {"nearly coplanar", filter_against_integers<float>(32, count, nearly_coplanar),
