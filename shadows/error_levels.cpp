@@ -14,112 +14,108 @@
 namespace halfshade {
 namespace {
 
-constexpr std::uint32_t kSetsAfter[] = {1, 2, 4, 8, 16, 32};  // the level of each round
 constexpr std::uint32_t kWindow = 8;  // receivers before and behind, in Morton order, that a receiver is judged with
 constexpr std::uint32_t kGroup = 32;  // receivers that one certificate is tried for
-/// Goals below this need the large sets from the start; above it, they would be too much for most receivers.
-constexpr double kLargeSetsBelow = 1.0 / 64.0;
 
-// The estimate. A sample next to the outline of what is hidden stands for a cell that is hidden in part: its error is
-// that of a number in 0..1 rounded to 0 or 1, with a standard deviation of 0.29. Both factors are chosen by measurement
-// (docs/max_error.md, "How the factors were chosen").
-constexpr double kCellDeviation = 0.29;
-constexpr double kDeviations = 4.0;  // that are allowed for
-constexpr double kSpreadFactor = 1.5;
-constexpr double kTwoSetsFactor = 2.0;  // two sets may be wrong by chance in the same way
-constexpr double kUnseenSamples = 8.0;  // that a feature no sample has met may be worth
+// The estimate (docs/max_error.md, "How the factors were chosen").
+constexpr double kUnseenSamples = 8.0;    // that a feature no sample has met may be worth
+constexpr double kSamplesPerGoal = 16.0;  // of the first set, over 1 / goal
+constexpr double kRowDeviations = 3.0;    // standard deviations that are allowed for: rows
+constexpr double kDeviations = 4.0;       // the same for samples anywhere, whose neighbours are not rounded evenly
 
-/// All receivers, in Morton order.
+/// Sets of round `index`. A round costs about as much for its receivers as for its samples, so the first set is large
+/// enough for nearly all; those of each further round are twice as large until sets can be no larger.
+SetShape shape_of(std::uint32_t index, double max_error) {
+  SetShape shape{8, 32};
+  while (shape.size() < 4096 && (shape.size() * max_error < kSamplesPerGoal || index > 0)) {
+    if (shape.size() * max_error >= kSamplesPerGoal) --index;
+    shape.rows == 64 ? shape.columns = 64 : shape.rows *= 2;
+  }
+  return shape;
+}
+
+/// All receivers, in Morton order. Rounds are weighted by the inverse of their variance.
 struct Progression {
   std::vector<std::uint32_t> order;
-  std::vector<std::uint32_t> visible, boundary, sets;  // sums over sets; sets asked
-  std::vector<std::uint64_t> squares;                  // sum over sets of visible^2
-  std::vector<double> spread;                          // see spread_at
+  std::vector<std::uint32_t> rounds, samples, visible;  // that were asked; samples that are visible
+  std::vector<double> weight, weighted, weighted_sq;    // sums over rounds of w, w V, w V^2
   std::vector<std::uint8_t> open;
 };
 
 void start(const ReceiverArray& receivers, Progression& p) {
   p.order = morton_order(receivers.position, [](std::uint32_t) { return true; });
   const std::size_t count = p.order.size();
-  p.visible.assign(count, 0), p.boundary.assign(count, 0), p.sets.assign(count, 0);
-  p.squares.assign(count, 0), p.spread.assign(count, 0.0), p.open.assign(count, 1);
+  p.rounds.assign(count, 0), p.samples.assign(count, 0), p.visible.assign(count, 0), p.open.assign(count, 1);
+  p.weight.assign(count, 0.0), p.weighted.assign(count, 0.0), p.weighted_sq.assign(count, 0.0);
 }
 
-double visibility_at(const Progression& p, std::size_t place, std::uint32_t set_size) {
-  return p.visible[place] / (static_cast<double>(set_size) * p.sets[place]);
+bool sees_all_or_nothing(const Progression& p, std::size_t place) {
+  return p.visible[place] == 0 || p.visible[place] == p.samples[place];
 }
 
-/// How far the mean is off to judge by how far the sets lie apart: their standard error, or the difference from the
-/// mean `before` this level if that is larger.
-double spread_at(const Progression& p, std::size_t place, double before, std::uint32_t set_size) {
-  const double sets = p.sets[place], sum = p.visible[place];
-  const double scatter = std::max(0.0, static_cast<double>(p.squares[place]) - sum * sum / sets);
-  return std::max(std::sqrt(scatter * sets / (sets - 1.0)) / (sets * set_size),
-                  std::fabs(visibility_at(p, place, set_size) - before));
+double visibility_at(const Progression& p, std::size_t place) {
+  if (sees_all_or_nothing(p, place)) return p.visible[place] == 0 ? 0.0 : 1.0;
+  return p.weighted[place] / p.weight[place];
 }
 
-/// What the receivers around a place have in common: an outline that passes between their samples shows in some of
-/// them.
-struct Surroundings {
-  double boundary = 0.0, spread = 0.0;  // largest per set, largest of those at the same level
-  bool constant = true;                 // all see all of the light, or all see nothing of it
-};
-
-Surroundings look_around(const Progression& p, std::size_t place, std::uint32_t set_size) {
-  Surroundings s;
+/// What the receivers around a place have in common: an outline that passes between the samples of one shows in some
+/// of the others.
+bool constant_around(const Progression& p, std::size_t place) {
   const std::size_t first = place - std::min<std::size_t>(place, kWindow),
                     last = std::min(p.order.size() - 1, place + kWindow);
   const bool dark = p.visible[place] == 0;
   for (std::size_t i = first; i <= last; ++i) {
-    s.constant = s.constant && p.visible[i] == (dark ? 0 : p.sets[i] * set_size);
-    s.boundary = std::max(s.boundary, static_cast<double>(p.boundary[i]) / p.sets[i]);
-    if (p.sets[i] == p.sets[place]) s.spread = std::max(s.spread, p.spread[i]);
+    if (p.visible[i] != (dark ? 0 : p.samples[i])) return false;
   }
-  return s;
+  return true;
 }
 
-double estimate_error(const Progression& p, std::size_t place, std::uint32_t set_size) {
-  const Surroundings s = look_around(p, place, set_size);
-  const double samples = static_cast<double>(set_size) * p.sets[place];
-  if (p.sets[place] == 1) return 1.0 / std::sqrt(samples);  // a strip between two rows of the only set
-  const double unseen = kUnseenSamples / samples;
-  if (s.constant) return unseen;
-  const double scatter = kDeviations * kCellDeviation * std::sqrt(std::max(s.boundary, 1.0) * p.sets[place]) / samples;
-  return (p.sets[place] == 2 ? kTwoSetsFactor : 1.0) * std::max({unseen, scatter, kSpreadFactor * s.spread});
+/// Of the mean of all rounds, from what was made of each; more where they lie farther apart than that allows.
+double deviation_at(const Progression& p, std::size_t place) {
+  const double mean = p.weighted[place] / p.weight[place], rounds = p.rounds[place];
+  const double apart = rounds > 1.0 ? (p.weighted_sq[place] - mean * p.weighted[place]) / (rounds - 1.0) : 0.0;
+  return std::sqrt(std::max(1.0, apart) / p.weight[place]);
 }
 
-/// A round's sets for the open receivers at `places`. Those that a certificate finds lit are closed.
-void ask_sets(LevelEngine& engine, std::span<const std::uint32_t> places, std::uint32_t first, std::uint32_t end,
-              const ShadowConfig& config, Progression& p, AdaptiveVisibility& result, ErrorLevel& level) {
+double estimate_error(const Progression& p, std::size_t place, double deviations) {
+  const double unseen = kUnseenSamples / p.samples[place];
+  return constant_around(p, place) ? unseen : std::max(unseen, deviations * deviation_at(p, place));
+}
+
+/// How rough the pictures of a place are: its own, or those around it if they are rougher on average. What lies between
+/// the samples of one receiver is met by some of the others', as often as it is wide.
+double roughness_around(std::span<const std::uint32_t> places, std::span<const SetAnswer> answers, std::size_t k) {
+  double sum = 0.0, count = 0.0;
+  const auto add = [&](std::size_t i) { sum += answers[i].roughness, count += 1.0; };
+  for (std::size_t i = k; i > 0 && places[i - 1] + kWindow >= places[k]; --i) add(i - 1);
+  for (std::size_t i = k; i < places.size() && places[i] <= places[k] + kWindow; ++i) add(i);
+  return std::max({1.0, static_cast<double>(answers[k].roughness), sum / count});
+}
+
+/// A round's sets for the open receivers at `places`.
+void ask_sets(LevelEngine& engine, const SetRound& round, const SetShape& shape, std::span<const std::uint32_t> places,
+              Progression& p, ErrorLevel& level) {
   std::vector<std::uint32_t> which;
   for (const std::uint32_t place : places) which.push_back(p.order[place]);
-  std::vector<double> before(places.size(), 0.0);
-  std::vector<std::uint8_t> lit(places.size(), 0);
-  if (first > 0) {
-    for (std::size_t k = 0; k < places.size(); ++k) before[k] = visibility_at(p, places[k], engine.set_size());
-  }
-  report_progress(config, static_cast<double>(first) / kSetsAfter[std::size(kSetsAfter) - 1]);
   std::vector<SetAnswer> answers;
-  engine.solve_sets(first, end, which, answers);
-  for (std::size_t i = 0; i < answers.size(); ++i) {
-    const std::size_t k = i % places.size(), place = places[k];
-    p.visible[place] += answers[i].visible, p.boundary[place] += answers[i].boundary;
-    p.squares[place] += std::uint64_t{answers[i].visible} * answers[i].visible;
-    ++p.sets[place];
-    lit[k] |= static_cast<std::uint8_t>(answers[i].lit);
-  }
-  level.samples += answers.size() * engine.set_size();
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    if (first > 0) p.spread[places[k]] = spread_at(p, places[k], before[k], engine.set_size());
-    if (lit[k] == 0) continue;
-    p.open[places[k]] = 0;
-    result.evidence[p.order[places[k]]] = ErrorEvidence::kProof;
-    ++result.proved_lit, ++level.proved;
-  }
+  engine.solve_round(shape, round, which, answers);
+  const std::uint32_t samples = shape.size() * round.count;
+  parallel_ranges(places.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k != end; ++k) {
+      const std::uint32_t place = places[k];
+      const double visibility = static_cast<double>(answers[k].visible) / samples;
+      const double weight = 12.0 * samples * samples / roughness_around(places, answers, k);
+      p.weight[place] += weight, p.weighted[place] += weight * visibility;
+      p.weighted_sq[place] += weight * visibility * visibility;
+      p.visible[place] += answers[k].visible, p.samples[place] += samples, ++p.rounds[place];
+    }
+  });
+  level.samples += places.size() * std::uint64_t{samples};
 }
 
 /// Groups of neighbours that all see everything, or all nothing: can that be proved for the whole light?
-void prove_groups(const LevelEngine& engine, Progression& p, AdaptiveVisibility& result, ErrorLevel& level) {
+void prove_groups(const LevelEngine& engine, std::uint32_t set_size, Progression& p, AdaptiveVisibility& result,
+                  ErrorLevel& level) {
   const std::size_t groups = (p.order.size() + kGroup - 1) / kGroup;
   std::vector<std::uint8_t> proved(groups, 0);
   parallel_ranges(groups, 16, [&](std::size_t begin, std::size_t end) {
@@ -129,7 +125,7 @@ void prove_groups(const LevelEngine& engine, Progression& p, AdaptiveVisibility&
       const auto all = [&](std::uint32_t v) { return std::count(seen.begin(), seen.end(), v) == std::ssize(seen); };
       const auto which = std::span(p.order).subspan(first, count);
       if (all(0)) proved[g] = engine.all_dark(which);
-      if (all(engine.set_size())) proved[g] = engine.all_lit(which);
+      if (all(set_size)) proved[g] = engine.all_lit(which);
     }
   });
   for (std::size_t place = 0; place < p.order.size(); ++place) {
@@ -140,20 +136,20 @@ void prove_groups(const LevelEngine& engine, Progression& p, AdaptiveVisibility&
   }
 }
 
-/// Closes the receivers whose estimate keeps the goal. All estimates first: they look at each other's state.
-void settle(std::span<const std::uint32_t> places, std::uint32_t set_size, double max_error, bool last, Progression& p,
+/// Closes the receivers whose estimate keeps the goal. Samples anywhere must agree with a second set of theirs.
+void settle(std::span<const std::uint32_t> places, bool rows, double max_error, bool last, Progression& p,
             AdaptiveVisibility& result, ErrorLevel& level) {
   std::vector<double> estimates(places.size(), 0.0);
   parallel_ranges(places.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k != end; ++k) {
-      if (p.open[places[k]] != 0) estimates[k] = estimate_error(p, places[k], set_size);
+      if (p.open[places[k]] != 0) estimates[k] = estimate_error(p, places[k], rows ? kRowDeviations : kDeviations);
     }
   });
   for (std::size_t k = 0; k < places.size(); ++k) {
     if (p.open[places[k]] == 0) continue;
     const std::uint32_t receiver = p.order[places[k]];
     result.bound[receiver] = static_cast<float>(estimates[k]);
-    if (p.sets[places[k]] > 1 && estimates[k] <= max_error) {
+    if ((rows || p.rounds[places[k]] > 1) && estimates[k] <= max_error) {
       p.open[places[k]] = 0, ++level.settled;
     } else {
       level.largest_bound = std::max(level.largest_bound, estimates[k]);
@@ -162,11 +158,11 @@ void settle(std::span<const std::uint32_t> places, std::uint32_t set_size, doubl
   }
 }
 
-void finish(const Progression& p, std::uint32_t set_size, AdaptiveVisibility& result) {
+void finish(const Progression& p, AdaptiveVisibility& result) {
   for (std::size_t place = 0; place < p.order.size(); ++place) {
     const std::uint32_t receiver = p.order[place];
-    result.visibility[receiver] = static_cast<float>(visibility_at(p, place, set_size));
-    result.samples[receiver] = p.sets[place] * set_size;
+    result.visibility[receiver] = static_cast<float>(visibility_at(p, place));
+    result.samples[receiver] = p.samples[place];
     result.samples_asked += result.samples[receiver];
     result.bound_kept = std::max(result.bound_kept, static_cast<double>(result.bound[receiver]));
   }
@@ -183,7 +179,7 @@ void reset(std::size_t count, double max_error, AdaptiveVisibility& result) {
 void solve_all_samples(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                        const ShadowConfig& config, AdaptiveVisibility& result, ShadowStats& stats) {
   Stopwatch watch;
-  const LightSamples samples = make_sets(light, config, mesh.frame, 32, 0);
+  const LightSamples samples = make_sets(light, config, mesh.frame, {}, {});
   VisibilityMasks masks;
   solve_masks(mesh, receivers, light, samples, config, masks, stats);
   visibility_of(masks, result.visibility);
@@ -218,30 +214,29 @@ void solve_to_error(const LatticeMesh& scene_mesh, const ReceiverArray& receiver
     return;
   }
   Stopwatch watch;
-  LevelEngine engine(opaque.get(), receivers, light, config, max_error < kLargeSetsBelow ? 64 : 32, stats);
-  result.set_size = engine.set_size(), result.pattern = engine.uses_rows() ? "tilted-rows" : "low-discrepancy";
+  LevelEngine engine(opaque.get(), receivers, light, config, stats);
+  result.set_size = shape_of(0, max_error).size(), result.pattern = engine.uses_rows() ? "rows" : "low-discrepancy";
   Progression p;
   start(receivers, p);
+  std::uint32_t samples = 0;
   watch.lap();
-  std::uint32_t asked_sets = 0;
-  for (const std::uint32_t sets : kSetsAfter) {
+  for (const SetRound& round : kSetRounds) {
     std::vector<std::uint32_t> places;
     for (std::uint32_t i = 0; i < p.order.size(); ++i) {
       if (p.open[i] != 0) places.push_back(i);
     }
     if (places.empty()) break;
-    const double build_before = stats.build_ms;
+    const SetShape shape = shape_of(round.index, max_error);
     ErrorLevel level;
-    level.samples_per_receiver = sets * engine.set_size(), level.receivers = places.size();
-    ask_sets(engine, places, asked_sets, sets, config, p, result, level);
-    if (asked_sets == 0) prove_groups(engine, p, result, level);
-    const bool last = sets == kSetsAfter[std::size(kSetsAfter) - 1];
-    settle(places, engine.set_size(), max_error, last, p, result, level);
-    level.ms = watch.lap() - (stats.build_ms - build_before);
+    samples += round.count * shape.size();
+    level.samples_per_receiver = samples, level.receivers = places.size();
+    ask_sets(engine, round, shape, places, p, level);
+    if (round.index == 0) prove_groups(engine, shape.size(), p, result, level);
+    settle(places, engine.uses_rows(), max_error, round.index + 1 == std::size(kSetRounds), p, result, level);
+    level.ms = watch.lap();
     result.levels.push_back(level);
-    asked_sets = sets;
   }
-  finish(p, engine.set_size(), result);
+  finish(p, result);
 }
 
 void solve_to_error(const Scene& scene, std::span<const Receiver> receivers, const Light& light,

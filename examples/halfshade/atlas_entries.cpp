@@ -57,6 +57,15 @@ AtlasFrame on_wall(const cases::Triangles& triangles, double reach, std::uint32_
 
 constexpr double kWireWidths[] = {0.01, 0.05, 0.0625, 0.1};
 
+/// Rows are shifted against each other: what that does is `why`.
+void add_shifted_rows(AtlasEntry& entry, const std::string& why) {
+  AtlasContender rows = entry.contenders.front();
+  rows.id = "exact, pattern rows";
+  rows.config.pattern = SamplePattern::kRows;
+  rows.why = "Rows are shifted against each other: " + why;
+  entry.contenders.push_back(std::move(rows));
+}
+
 AtlasEntry thin_wire(std::uint32_t side) {
   AtlasEntry entry;
   entry.id = "wire";
@@ -89,11 +98,7 @@ AtlasEntry thin_wire(std::uint32_t side) {
     contender.why = fmt::format("The same with {0} columns: up to 1/{0}.", n == 16 ? 4 : 32);
     entry.contenders.push_back(contender);
   }
-  AtlasContender rows = entry.contenders.front();
-  rows.id = "exact, pattern rows";
-  rows.config.pattern = SamplePattern::kRows;
-  rows.why = "Rows are shifted against each other: 16 different places per column, and no jump larger than a few bits.";
-  entry.contenders.push_back(rows);
+  add_shifted_rows(entry, "16 different places per column, and no jump larger than a few bits.");
   return entry;
 }
 
@@ -163,6 +168,8 @@ AtlasEntry overlapping_cards(std::uint32_t side) {
   entry.across = "x", entry.down = "y";
   entry.add_variant("accumulation sum, K = 5", "accumulation sum", {"shadow-accumulation.kernel=5"});
   entry.add_variant("accumulation sum, K = 32", "accumulation sum", {"shadow-accumulation.kernel=32"});
+  entry.add_variant("accumulation sum, K = 32, as printed", "accumulation sum",
+                    {"shadow-accumulation.kernel=32", "shadow-accumulation.refine=off", "shadow-accumulation.plane=1"});
   return entry;
 }
 
@@ -240,11 +247,7 @@ AtlasEntry fence(std::uint32_t side) {
   filtered.config.stsv.filter = OpacityFilter::kFiltered;
   filtered.why = "Opacity averaged over each sample's share of the light: no masks, and no swing.";
   entry.contenders.push_back(filtered);
-  AtlasContender rows = entry.contenders.front();
-  rows.id = "exact, pattern rows";
-  rows.config.pattern = SamplePattern::kRows;
-  rows.why = "Rows shifted against each other meet the bars at 16 different phases.";
-  entry.contenders.push_back(rows);
+  add_shifted_rows(entry, "they meet the bars at 16 different phases.");
   return entry;
 }
 

@@ -48,7 +48,7 @@ ReceiverArray receivers_of_whole_light(const GBuffer& gbuffer, const Light& ligh
                                        const LocalFrame& frame) {
   ShadowConfig config = asked;
   config.interleave = false, config.sample_sets = 1;
-  return make_receivers(gbuffer, make_sets(light, config, frame, 32, 0), config.seed);
+  return make_receivers(gbuffer, make_sets(light, config, frame, {}, {}), config.seed);
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 
 #include "max_error.h"
 #include "pipeline.h"
@@ -30,7 +31,7 @@ struct Candidate {
   std::string name, arguments;  // for people; for `halfshade render`
   ShadowConfig config;
   bool adaptive = false;
-  std::vector<double> shadow_ms, build_ms;
+  std::vector<double> shadow_ms, build_ms, cpu_ms;
   std::vector<float> visibility;
   double rmse = 0.0, largest = 0.0, share_above = 0.0;
   std::string reason;  // why there is no result
@@ -82,6 +83,7 @@ struct Subject {
 void run_once(const Subject& s, double goal, double time_limit, Candidate& c) {
   ShadowConfig config = c.config;
   Stopwatch watch, since_start;
+  const std::clock_t cpu_before = std::clock();
   double spent = 0.0;
   config.progress = [&](double) { return stop_signal() == 0 && (spent += since_start.lap()) < 1000.0 * time_limit; };
   ShadowStats stats;
@@ -102,6 +104,7 @@ void run_once(const Subject& s, double goal, double time_limit, Candidate& c) {
   }
   c.shadow_ms.push_back(watch.lap() - stats.build_ms);
   c.build_ms.push_back(stats.build_ms);
+  c.cpu_ms.push_back(1e3 * static_cast<double>(std::clock() - cpu_before) / CLOCKS_PER_SEC);
 }
 
 void measure_error(const Subject& s, double goal, Candidate& c) {
@@ -152,6 +155,7 @@ ordered_json candidates_json(const std::vector<Candidate>& all, double goal) {
     if (c.reason.empty()) {
       point.update({{"shadow_ms", median(c.shadow_ms)},
                     {"build_ms", median(c.build_ms)},
+                    {"cpu_ms", median(c.cpu_ms)},
                     {"runs", c.shadow_ms.size()},
                     {"rmse", c.rmse},
                     {"max", c.largest},

@@ -39,8 +39,8 @@ struct AdaptiveVisibility {
   std::uint64_t proved_umbra = 0;       // and none of it
   std::uint64_t exhausted = 0;          // receivers that ran out of samples above the goal
   std::uint64_t samples_asked = 0;      // of all receivers and rounds
-  std::string pattern;         // "tilted-rows" or "low-discrepancy", or "all" where the light is made of samples
-  std::uint32_t set_size = 0;  // samples of one set
+  std::string pattern;                  // "rows" or "low-discrepancy", or "all" where the light is made of samples
+  std::uint32_t set_size = 0;           // samples of the first set; later ones are larger
 };
 
 /// Smallest goal that solve_to_error accepts.

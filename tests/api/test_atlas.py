@@ -110,6 +110,8 @@ class Atlas(unittest.TestCase):
         self.assertLess(self.answers("fence")["stsv, filtered"]["max"], 0.1)
         self.assertGreater(self.answers("overlap")["accumulation sum, K = 5"]["details"]
                            ["shadow-accumulation.largest_sum"], 1.5)
+        self.assertGreater(self.answers("overlap")["accumulation sum, K = 32, as printed"]["details"]
+                           ["shadow-accumulation.largest_sum"], 1.5)
         layers = self.answers("hidden_layer")
         self.assertLess(layers["accumulation bits, 8 layers"]["mean"], 0.5 * layers["accumulation bits"]["mean"])
         gears = self.answers("hot_cell")["gears"]["details"]

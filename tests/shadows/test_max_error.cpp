@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include "halfshade/adaptive.h"
-#include "shadows/set_sequence.h"
+#include "shadows/exact_engine.h"
+#include "shadows/run_meter.h"
 #include "support/lit_scene.h"
 
 using namespace halfshade;
@@ -75,7 +76,7 @@ double worst_behind_strip(const dvec2& n, double low, double high, double goal) 
 
 TEST_CASE("behind an edge at any angle the error of visibility is below the goal") {
   for (const double goal : {1.0 / 32, 1.0 / 64, 1.0 / 256}) {
-    for (const double degrees : {0.0, 1.7899, 7.0, 23.0, 45.0, 61.0, 88.21, 90.0, 133.0, 178.21}) {
+    for (const double degrees : {0.0, 1.7899, 7.0, 16.7, 23.0, 30.7, 45.0, 61.0, 88.21, 90.0, 133.0, 163.3, 178.21}) {
       CAPTURE(goal);
       CAPTURE(degrees);
       const double angle = degrees / 180.0 * 3.14159265358979;
@@ -187,25 +188,138 @@ TEST_CASE("goals out of range are refused") {
   }
 }
 
-TEST_CASE("every tilted set has one sample in each of as many rows and columns as it has samples") {
+TEST_CASE("together the rows of a round are evenly spaced, and no two of its samples share a place along them") {
   const Light light = frame_light();
   const LocalFrame frame = make_local_frame({}, light_extent(light));
-  for (std::uint32_t set = 0; set < 4; ++set) {
-    for (const std::uint32_t side : {32u, 64u}) {
-      const LightSamples samples = make_sets(light, {}, frame, side, set);
-      std::array<std::vector<int>, 2> hits = {std::vector<int>(side * side, 0), std::vector<int>(side * side, 0)};
+  for (const SetRound& round : kSetRounds) {
+    for (const SetShape shape : {SetShape{8, 32}, {16, 32}, {32, 32}, {64, 32}, {64, 64}}) {
+      const LightSamples samples = make_sets(light, {}, frame, shape, round);
+      const std::uint32_t size = shape.size() * round.count;
+      REQUIRE(samples.points.size() == size);
+      std::array<std::vector<int>, 2> hits = {std::vector<int>(size, 0), std::vector<int>(size, 0)};
       for (const vec3& p : samples.points) {
         const dvec3 world = (dvec3(p) - samples.center) / frame.scale;
-        for (int axis = 0; axis < 2; ++axis) {
+        for (std::size_t axis = 0; axis < 2; ++axis) {
           const double x = (axis == 0 ? world.x : world.z) * 0.5 + 0.5;
           REQUIRE(x >= 0.0);
           REQUIRE(x < 1.0);
-          ++hits[axis][static_cast<std::size_t>(x * side * side)];
+          ++hits[axis][static_cast<std::size_t>(x * size)];
         }
       }
-      for (const std::vector<int>& axis_hits : hits) {
-        CHECK(std::count(axis_hits.begin(), axis_hits.end(), 1) == static_cast<std::ptrdiff_t>(side * side));
+      const std::size_t along = round.index % 2;
+      CHECK(std::count(hits[along].begin(), hits[along].end(), 1) == static_cast<std::ptrdiff_t>(size));
+      std::vector<std::size_t> heights;
+      for (std::size_t i = 0; i < size; ++i) {
+        if (hits[1 - along][i] != 0) heights.push_back(i);
+      }
+      REQUIRE(heights.size() == shape.rows * round.count);
+      for (std::size_t row = 0; row < heights.size(); ++row) {
+        CHECK(heights[row] == row * shape.columns + shape.columns / 2);  // the middle of the row's stripe
+        CHECK(hits[1 - along][heights[row]] == static_cast<int>(shape.columns));
       }
     }
+  }
+}
+
+TEST_CASE("every set of a rectangle has rows that the fast kernel takes, whichever way its edges turn") {
+  Light light = frame_light();
+  for (const bool mirrored : {false, true}) {
+    if (mirrored) std::swap(light.u, light.v);
+    const LocalFrame frame = make_local_frame({}, light_extent(light));
+    for (const SetRound& round : kSetRounds) {
+      CAPTURE(round.index);
+      CAPTURE(mirrored);
+      ExactLight kept;
+      prepare_exact_light(light, make_sets(light, {}, frame, {64, 32}, round), kept);
+      CHECK(kept.rows.rows == 64);
+    }
+  }
+}
+
+namespace {
+
+/// Samples of the first set of a round, [-1,1] along the light's u and v.
+std::vector<dvec2> places_of(const SetShape& shape, const SetRound& round) {
+  const Light light = frame_light();
+  const LocalFrame frame = make_local_frame({}, light_extent(light));
+  const LightSamples samples = make_sets(light, {}, frame, shape, round);
+  std::vector<dvec2> places;
+  for (std::uint32_t i = 0; i < shape.size(); ++i) {
+    const dvec3 world = (dvec3(samples.points[i]) - samples.center) / frame.scale;
+    places.emplace_back(world.x, world.z);
+  }
+  return places;
+}
+
+/// Those with dot(n, p) > c are blocked.
+std::vector<std::uint64_t> mask_of_half_plane(const std::vector<dvec2>& places, const dvec2& n, double c) {
+  std::vector<std::uint64_t> mask(places.size() / 64, 0);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (glm::dot(n, places[i]) > c) mask[i / 64] |= std::uint64_t{1} << i % 64;
+  }
+  return mask;
+}
+
+}  // namespace
+
+TEST_CASE("the share of a half-plane is rarely farther off than its picture says, at any angle") {
+  for (const SetShape shape : {SetShape{8, 32}, {32, 32}, {64, 32}, {64, 64}}) {
+    for (const SetRound& round : {kSetRounds[0], kSetRounds[1]}) {
+      const RunMeter meter(shape, round, 0);
+      const std::vector<dvec2> places = places_of(shape, round);
+      double worst = 0.0, count = 0.0, beyond = 0.0;
+      for (int k = 0; k < 180; ++k) {
+        const double angle = k * 0.0349065850398866;
+        const dvec2 n(std::cos(angle), std::sin(angle));
+        for (double c = -0.8; c < 0.85; c += 0.0373) {
+          const SetAnswer answer = meter.read(mask_of_half_plane(places, n, c));
+          if (answer.roughness == 0) continue;
+          const double error = std::fabs(answer.visible - share_below(n, c) * shape.size());
+          const double deviations = error / std::sqrt(answer.roughness / 12.0);
+          worst = std::max(worst, deviations), count += 1.0, beyond += deviations > 3.0;  // kRowDeviations
+        }
+      }
+      CAPTURE(shape.rows);
+      CAPTURE(shape.columns);
+      CAPTURE(round.index);
+      CHECK(worst <= 4.5);
+      CHECK(beyond <= 0.01 * count);
+    }
+  }
+}
+
+TEST_CASE("the variance of a picture of samples by chance is that of a count of coins") {
+  std::mt19937_64 engine(11);
+  for (const SetShape shape : {SetShape{32, 32}, {64, 64}}) {
+    const RunMeter meter(shape, {}, 0);
+    std::vector<std::uint64_t> mask(shape.size() / 64);
+    for (std::uint64_t& word : mask) word = engine();
+    CHECK(meter.read(mask).roughness / 12.0 == doctest::Approx(shape.size() / 4.0).epsilon(0.15));
+  }
+}
+
+TEST_CASE("runs are squared along the rows and along the lattice") {
+  for (const SetShape shape : {SetShape{16, 32}, {64, 64}}) {
+    const RunMeter meter(shape, {}, 0);
+    std::vector<std::uint64_t> mask(shape.size() / 64, 0);
+    CHECK(meter.read(mask).roughness == 0);
+    for (std::uint32_t i = 0; i < 5 * shape.columns; ++i)
+      mask[i / 64] |= std::uint64_t{1} << i % 64;  // five whole rows
+    CHECK(meter.read(mask).roughness == shape.columns * shape.columns);
+    CHECK(meter.read(mask).visible == shape.size() - 5 * shape.columns);
+    std::fill(mask.begin(), mask.end(), 0);
+    mask[2] = 1 << 7;  // alone, both in its row and in its column: four neighbours differ
+    CHECK(meter.read(mask).roughness == 4 + 4 * 2);
+    // An edge along the lattice itself: in each row as many samples as the lattice has moved on by.
+    const std::vector<bool> wraps = row_wraps(shape, {}, 0);
+    std::fill(mask.begin(), mask.end(), 0);
+    std::uint32_t columns = 3, rows = 0;
+    for (; rows < shape.rows && columns < shape.columns; ++rows) {
+      for (std::uint32_t i = rows * shape.columns; i < rows * shape.columns + columns; ++i) {
+        mask[i / 64] |= std::uint64_t{1} << i % 64;
+      }
+      if (rows + 1 < shape.rows) columns += wraps[rows];
+    }
+    CHECK(meter.read(mask).roughness >= rows * rows);
   }
 }

@@ -85,8 +85,6 @@ std::vector<StabilityCase> sphere_aims(bool at_edges, int rings, int segments, i
   return cases;
 }
 
-std::vector<Triangle> half_plane() { return quad({-64, 2, -64}, {0, 2, -64}, {0, 2, 64}, {-64, 2, 64}); }
-
 std::vector<dvec3> half_plane_receivers() {
   std::vector<dvec3> points;
   for (int i = -64; i <= 64; ++i) points.push_back({i / 64.0, 0.0, 0.25});
@@ -111,18 +109,6 @@ std::vector<dvec3> grazing_points(Random& random, const std::vector<Triangle>& t
   return points;
 }
 
-std::vector<Triangle> scattered_triangles(std::uint64_t seed, int count) {
-  Random random(seed);
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const dvec3 c = random.in_box(-4.0, 3.5);
-    Triangle t;
-    for (dvec3& p : t) p = glm::round((c + random.in_box(-0.7, 0.7)) * 1024.0) / 1024.0;
-    triangles.push_back(t);
-  }
-  return triangles;
-}
-
 StabilityCase moved_case(const std::vector<Triangle>& triangles, const std::vector<dvec3>& points, const dvec3& offset,
                          double scale) {
   StabilityCase m{scale == 1.0 ? "S06 far_origin" : "S07 scale", scene_of(triangles), receivers_at(points),
@@ -144,8 +130,6 @@ std::vector<dvec3> floor_points(int side, double reach) {
   return points;
 }
 
-std::vector<Triangle> plate(double y) { return quad({-1, y, -1}, {1, y, -1}, {1, y, 1}, {-1, y, 1}); }
-
 Scene alpha_card(float cutoff, const dvec2& uv_low, const dvec2& uv_high) {
   Scene scene = scene_of(quad({-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}));
   AlphaMap map{"ramp", 4, 4, {}};
@@ -158,23 +142,10 @@ Scene alpha_card(float cutoff, const dvec2& uv_low, const dvec2& uv_high) {
   return scene;
 }
 
-Scene bars() {
-  Scene scene = scene_of(quad({-16, 3.5, -16}, {16, 3.5, -16}, {16, 3.5, 16}, {-16, 3.5, 16}));
-  scene.alpha_maps.push_back({"bars", 2, 1, {255, 0}});
-  scene.materials[0].alpha_map = 0;
-  const float repeats = 32.0f * 64.0f;
-  scene.triangle_uvs = {{vec2(0, 0), vec2(repeats, 0), vec2(repeats, 1)}, {vec2(0, 0), vec2(repeats, 1), vec2(0, 1)}};
-  return scene;
-}
-
 std::vector<dvec3> bar_receivers() {  // one period of the shadow: the bars' own, times 4 / 0.5
   std::vector<dvec3> points;
   for (int i = 0; i < 256; ++i) points.push_back({i / 256.0 / 8.0, 0.0, 0.013});
   return points;
-}
-
-std::vector<Triangle> wire(double width) {
-  return quad({-width / 2, 2, -8}, {width / 2, 2, -8}, {width / 2, 2, 8}, {-width / 2, 2, 8});
 }
 
 std::vector<dvec3> wire_receivers(int count) {
@@ -253,7 +224,7 @@ void add_geometry(Catalogue& list) {
     const std::vector<Triangle> triangles = slivers(random, aspect);
     list.add("S05 sliver_grazing", triangles, grazing_points(random, triangles));
   }
-  const std::vector<Triangle> scattered = joined(half_plane(), scattered_triangles(6, 1000));
+  const std::vector<Triangle> scattered = joined(half_plane(), cases::scattered(6, 1000));
   for (const double offset : {0.0, 1e6}) {
     list.add({moved_case(scattered, half_plane_receivers(), dvec3(offset, -offset, 2 * offset), 1.0)});
   }

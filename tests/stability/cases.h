@@ -44,16 +44,17 @@ std::vector<Triangle> uv_sphere(const dvec3& center, double radius, int rings, i
 
 Light sample_light(std::vector<dvec3> points);
 
-/// The half-plane y = 2, x <= 0, and 129 receivers at x = -1 .. 1.
-std::vector<Triangle> half_plane();
+using cases::bars;
+using cases::half_plane;
+using cases::plate;
+using cases::wire;
+
+/// 129 receivers at x = -1 .. 1, across the edge of half_plane().
 std::vector<dvec3> half_plane_receivers();
 
 /// Slivers of that aspect; receivers nearly in their planes, seen at half a degree.
 std::vector<Triangle> slivers(Random& random, double aspect);
 std::vector<dvec3> grazing_points(Random& random, const std::vector<Triangle>& triangles);
-
-/// About the light's frame, on multiples of 2^-10.
-std::vector<Triangle> scattered_triangles(std::uint64_t seed, int count);
 
 /// half_plane() and such triangles, scaled and then moved; receivers and light with them.
 StabilityCase moved_case(const std::vector<Triangle>& triangles, const std::vector<dvec3>& points, const dvec3& offset,
@@ -61,19 +62,14 @@ StabilityCase moved_case(const std::vector<Triangle>& triangles, const std::vect
 
 /// side x side points of y = 0, |x|, |z| <= reach.
 std::vector<dvec3> floor_points(int side, double reach);
-/// [-1,1] x {y} x [-1,1].
-std::vector<Triangle> plate(double y);
 
 /// A card at y = 2 with a texture of 4 x 4 texels of growing alpha.
 Scene alpha_card(float cutoff, const dvec2& uv_low, const dvec2& uv_high);
 
-/// Bars of a period of 1/64, half of it opaque, at y = 3.5; receivers over one period of their shadow.
-Scene bars();
+/// Over one period of the shadow of bars().
 std::vector<dvec3> bar_receivers();
 
-/// A strip of that width along z at y = 2; seen from y = 0 it covers twice the width on the light. Receivers sweep it
-/// over eight distances between samples.
-std::vector<Triangle> wire(double width);
+/// Sweep a wire, which covers twice its width on the light as seen from y = 0, over eight distances between samples.
 std::vector<dvec3> wire_receivers(int count);
 
 }  // namespace halfshade::test

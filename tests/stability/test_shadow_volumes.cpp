@@ -21,7 +21,7 @@ TEST_CASE("S04 split_quad: a segment through the edge that two quads share count
 
 TEST_CASE("S28 wedge_overlap: two quads that hide the same half of the light leave the other half") {
   // Both hide the samples with x < 0 from the origin.
-  const auto quads = joined(half_plane(), quad({-64, 2.5, -64}, {0, 2.5, -64}, {0, 2.5, 64}, {-64, 2.5, 64}));
+  const auto quads = cases::double_cover();
   const DepthComplexity depth = depth_of(scene_of(quads), {{0, 0, 0}}, 256);
   CHECK(depth.visibility(0) == 0.5f);
   std::uint32_t sum = 0;

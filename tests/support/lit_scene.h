@@ -6,53 +6,17 @@
 
 #include "halfshade/depth_complexity.h"
 #include "halfshade/shadows.h"
+#include "rasterizer/scenes/hard_cases.h"
 
 namespace halfshade::test {
 
-using Triangle = std::array<dvec3, 3>;
-
-inline Scene scene_of(const std::vector<Triangle>& triangles) {
-  Scene scene;
-  scene.materials.emplace_back();
-  for (const Triangle& t : triangles) {
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    scene.positions.insert(scene.positions.end(), t.begin(), t.end());
-    scene.triangles.push_back({first, first + 1, first + 2});
-    scene.triangle_materials.push_back(0);
-  }
-  return scene;
-}
-
-inline std::vector<Triangle> quad(const dvec3& a, const dvec3& b, const dvec3& c, const dvec3& d) {
-  return {{a, b, c}, {a, c, d}};
-}
-
-/// Closed box, wound outward.
-inline std::vector<Triangle> box(const dvec3& low, const dvec3& high) {
-  const auto corner = [&](int i) {
-    return dvec3(i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z);
-  };
-  std::vector<Triangle> result;
-  for (const auto& f : {std::array{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
-    const auto q = quad(corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]));
-    result.insert(result.end(), q.begin(), q.end());
-  }
-  return result;
-}
-
-inline std::vector<Triangle> joined(std::vector<Triangle> a, const std::vector<Triangle>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
-/// The light of the stability cases: [-1,1] x {y = 4} x [-1,1], facing down.
-inline Light frame_light() {
-  Light light;
-  light.center = {0.0, 4.0, 0.0};
-  light.u = {2.0, 0.0, 0.0};  // u x v points down
-  light.v = {0.0, 0.0, 2.0};
-  return light;
-}
+// Geometry that the failure atlas shows as well.
+using cases::box;
+using cases::frame_light;
+using cases::joined;
+using cases::quad;
+using cases::scene_of;
+using cases::Triangle;
 
 inline ShadowConfig frame_config(std::uint32_t samples = 256) {
   ShadowConfig config;
