@@ -25,16 +25,26 @@ using IntTag = hn::RebindToSigned<Tag>;
 using UintVec = hn::Vec<UintTag>;
 constexpr std::size_t kMaxLines = SampleRows::kMaxLines;
 
+/// Receivers as boxes.
+struct ReceiverBox {
+  vec3 low{1e30f}, high{-1e30f};  // lattice
+  Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};  // the light's frame, and what of the light is asked
+
+  void add(const LightFrame& frame, const vec3& r) {
+    const vec3 p(frame.to_frame(dvec3(r)));
+    low = glm::min(low, r), high = glm::max(high, r);
+    for (int k = 0; k < 3; ++k) shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
+  }
+};
+
 /// Receivers [first, first + count), a lane each; lanes beyond repeat the last one and have nothing open.
-struct Packet {
+struct Packet : ReceiverBox {
   std::size_t first = 0, count = 0;
   Vec3 position, to_center;       // lattice; from there to the light's centre
   Vec distance;                   // bound on |coordinate| of receiver to sample
   Vec height_error, place_error;  // 5 |r - c| / height + 10; 5 |r - c|: see ProjectVertices
   Vec column, row, height;        // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                    // own triangle
-  vec3 low, high;                 // box around the receivers, lattice
-  Shaft shaft;                    // the same in the light's frame, and a rectangle around what is open of the light
   const PictureLines* lines;      // where the rows lie
   std::uint32_t any_open[kMaxLines];                                // what some receiver has open
   alignas(HWY_MAX_BYTES) std::uint32_t open[kMaxLines][kMaxLanes];  // bit i: sample i of the line is not blocked yet
@@ -113,17 +123,17 @@ HWY_INLINE std::uint64_t LanesOverOpenSamples(const SampleRows& rows, const Lane
   return kept;
 }
 
-/// Boxes from `i` on, of those listed for the cluster.
+/// Boxes from `i` on; lane i of the ranges is the first.
 HWY_INLINE std::uint64_t BoxesOverOpenSamples(const SampleRows& rows, const float* const low[3],
-                                              const float* const high[3], std::size_t i, const Packet& packet) {
+                                              const float* const high[3], std::size_t i, const Packet& packet,
+                                              std::size_t first_range, PictureRanges& ranges) {
   LaneRectangles q;
   const std::uint64_t between = Bits(ProjectBoxes(packet.shaft, low, high, i, q));
   const Vec pad = hn::Set(Tag(), ProjectionPad(packet.shaft.low[2]) + rows.deviation);
   for (int k = 0; k < 2; ++k) q.low[k] = hn::Sub(q.low[k], pad), q.high[k] = hn::Add(q.high[k], pad);
   if (between == 0) return 0;
-  PictureRanges ranges;
-  FindRanges(rows, q, 0, ranges);
-  return LanesOverOpenSamples(rows, q, between, packet, 0, ranges);
+  FindRanges(rows, q, first_range, ranges);
+  return LanesOverOpenSamples(rows, q, between, packet, first_range, ranges);
 }
 
 /// Triangles of a leaf as the packet sees them. Bits are triangles.
@@ -136,9 +146,11 @@ struct LeafView {
   PictureRanges ranges;
 };
 
-/// On which side of the planes the packet's box lies, and so whether they separate it from samples.
-HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const Packet& packet, const vec3& half,
-                          const Vec3& to_corner, LeafView& view) {
+/// On which side of the planes a box of receivers lies, and so whether they separate it from samples. Fills above, below
+/// and active.
+template <class View>
+HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const vec3& low, const vec3& high,
+                          const vec3& half, const Vec3& to_corner, View& view) {
   const Tag d;
   const Vec3 normal{hn::LoadU(d, leaf.normal[0] + i), hn::LoadU(d, leaf.normal[1] + i),
                     hn::LoadU(d, leaf.normal[2] + i)};
@@ -148,9 +160,8 @@ HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const Pa
   const Vec error = hn::MulAdd(hn::Mul(hn::LoadU(d, leaf.side_error + i), far), hn::Set(d, 2.0f), reach);
   const auto above = static_cast<std::uint32_t>(Bits(hn::Gt(side, error))),
              below = static_cast<std::uint32_t>(Bits(hn::Lt(side, hn::Neg(error))));
-  const bool outside_box = packet.low.x > leaf.box_high.x || packet.low.y > leaf.box_high.y ||
-                           packet.low.z > leaf.box_high.z || packet.high.x < leaf.box_low.x ||
-                           packet.high.y < leaf.box_low.y || packet.high.z < leaf.box_low.z;
+  const bool outside_box = low.x > leaf.box_high.x || low.y > leaf.box_high.y || low.z > leaf.box_high.z ||
+                           high.x < leaf.box_low.x || high.y < leaf.box_low.y || high.z < leaf.box_low.z;
   const std::uint32_t in_leaf = (1u << std::min<std::size_t>(leaf.count - i, hn::Lanes(d))) - 1;
   const std::uint32_t samples_above = leaf.samples_above >> i,
                       samples_below = (leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u)) >> i;
@@ -168,7 +179,7 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
   const vec3 middle(frame.to_frame(dvec3(from)));
   float half[3];
   for (int k = 0; k < 3; ++k) half[k] = std::max(box.high[k] - middle[k], middle[k] - box.low[k]) + 1e-6f;
-  Vec least = hn::Set(d, 1e30f), farthest = hn::Zero(d);
+  Vec least = hn::Set(d, 1e30f), lowest = least, farthest = hn::Zero(d);
   Vec nearest[2] = {least, least}, last[2] = {hn::Neg(least), hn::Neg(least)};  // of (v - r)
   Vec place_low[2] = {least, least}, place_high[2] = {hn::Neg(least), hn::Neg(least)};
   for (int axis = 0; axis < 2; ++axis) q.low[axis] = least, q.high[axis] = hn::Neg(least);
@@ -176,6 +187,7 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
     const Vec up = Dot(c, normal), z = hn::Add(up, hn::Set(d, middle[2]));
     const Vec near = hn::Sub(hn::Neg(up), hn::Set(d, half[2])), far = hn::Sub(hn::Set(d, half[2]), up);  // r_z - v_z
     least = hn::Min(least, near);
+    lowest = hn::Min(lowest, z);
     farthest = hn::Max(farthest, Norm1(c));
     const Vec w0 = hn::Div(z, near), w1 = hn::Div(z, far);
     for (int axis = 0; axis < 2; ++axis) {
@@ -188,16 +200,23 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
       place_low[axis] = hn::Min(place_low[axis], place), place_high[axis] = hn::Max(place_high[axis], place);
     }
   }
-  // Triangles that reach the height of a receiver project without bounds, but only away from the receivers.
+  // Triangles that reach the height of a receiver project without bounds, but only away from the receivers, and at least
+  // as far as from their lowest height.
   farthest = hn::Add(farthest, hn::Set(d, half[0] + half[1] + half[2]));
   const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
   const Vec magnified = hn::Div(hn::Mul(farthest, hn::Set(d, 1e-6f * (box.high[2] + 4.0f))), least);
   pad = hn::Add(magnified, hn::Set(d, ProjectionPad(box.low[2])));
-  const Vec everywhere = hn::Set(d, 1e9f), margin = hn::Set(d, 2e-5f);
+  const Vec everywhere = hn::Set(d, 1e9f), margin = hn::Set(d, 2e-5f), zero = hn::Zero(d);
+  const Vec depth = hn::Add(hn::Max(hn::Sub(hn::Set(d, box.high[2]), lowest), zero), margin);
+  const Vec away_by = hn::Div(hn::Mul(hn::Max(hn::Sub(lowest, margin), zero), hn::Set(d, 0.999f)), depth);
   for (int axis = 0; axis < 2; ++axis) {
     const Vec low =
-        hn::IfThenElse(hn::Gt(nearest[axis], margin), hn::Sub(place_low[axis], margin), hn::Neg(everywhere));
-    const Vec high = hn::IfThenElse(hn::Lt(last[axis], hn::Neg(margin)), hn::Add(place_high[axis], margin), everywhere);
+        hn::IfThenElse(hn::Gt(nearest[axis], margin),
+                       hn::MulAdd(hn::Sub(nearest[axis], margin), away_by, hn::Sub(place_low[axis], margin)),
+                       hn::Neg(everywhere));
+    const Vec high =
+        hn::IfThenElse(hn::Lt(last[axis], hn::Neg(margin)),
+                       hn::MulAdd(hn::Add(last[axis], margin), away_by, hn::Add(place_high[axis], margin)), everywhere);
     q.low[axis] = hn::IfThenElse(bounded, hn::Sub(q.low[axis], pad), low);
     q.high[axis] = hn::IfThenElse(bounded, hn::Add(q.high[axis], pad), high);
   }
@@ -216,7 +235,7 @@ HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& 
         {hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i), hn::LoadU(d, leaf.corner[k][2] + i)},
         Splat(middle));
   }
-  FindSides(leaf, i, packet, half, to_corner[0], view);
+  FindSides(leaf, i, packet.low, packet.high, half, to_corner[0], view);
   const std::uint64_t active = (view.active >> i) & ((std::uint64_t{1} << hn::Lanes(d)) - 1);
   if (active == 0) return;
   LaneRectangles q;
@@ -228,33 +247,39 @@ HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& 
   view.kept |= static_cast<std::uint32_t>(LanesOverOpenSamples(*scene.rows, q, active, packet, i, view.ranges)) << i;
 }
 
-/// Vertices of a leaf as each receiver sees them before the light, in columns and rows; `error` bounds how far they may
-/// lie off, in lengths along either axis.
+/// Vertices as each receiver sees them before the light, in columns and rows; `error` bounds how far they may lie off, in
+/// lengths along either axis.
 struct ProjectedVertices {
-  alignas(HWY_MAX_BYTES) float column[3 * BlockerTree::kWidth][kMaxLanes], row[3 * BlockerTree::kWidth][kMaxLanes],
-      error[3 * BlockerTree::kWidth][kMaxLanes];
+  static constexpr std::size_t kMost = 255;
+  alignas(HWY_MAX_BYTES) float column[kMost][kMaxLanes], row[kMost][kMaxLanes], error[kMost][kMaxLanes];
 };
 
-/// Those in `wanted`, which must lie between the receivers and the light.
-HWY_INLINE void ProjectVertices(const ExactScene& scene, const BlockerTree::Leaf& leaf, std::uint64_t wanted,
-                                const Packet& packet, ProjectedVertices& projected) {
-  const Tag d;
-  const SampleRows& rows = *scene.rows;
-  const Vec3 axis_x = Splat(rows.axis_x * rows.scale), axis_y = Splat(rows.axis_y * rows.row_scale),
-             down = Splat(vec3(-scene.frame.n));
-  for (; wanted != 0; wanted &= wanted - 1) {
-    const auto v = static_cast<std::size_t>(std::countr_zero(wanted));
-    const Vec3 way = Subtract(Splat({leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]}), packet.position);
-    const Vec inverse = hn::Div(hn::Set(d, 1.0f), Dot(way, down)), scale = hn::Mul(packet.height, inverse);
-    hn::Store(hn::MulAdd(Dot(way, axis_x), scale, packet.column), d, projected.column[v]);
-    hn::Store(hn::MulAdd(Dot(way, axis_y), scale, packet.row), d, projected.row[v]);
+/// Projects vertices, which must lie between the receivers and the light.
+class VertexProjection {
+ public:
+  VertexProjection(const ExactScene& scene, const Packet& packet)
+      : packet_(packet),
+        axis_x_(Splat(scene.rows->axis_x * scene.rows->scale)),
+        axis_y_(Splat(scene.rows->axis_y * scene.rows->row_scale)),
+        down_(Splat(vec3(-scene.frame.n))) {}
+
+  HWY_INLINE void Project(const vec3& vertex, std::size_t slot, ProjectedVertices& projected) const {
+    const Tag d;
+    const Vec3 way = Subtract(Splat(vertex), packet_.position);
+    const Vec inverse = hn::Div(hn::Set(d, 1.0f), Dot(way, down_)), scale = hn::Mul(packet_.height, inverse);
+    hn::Store(hn::MulAdd(Dot(way, axis_x_), scale, packet_.column), d, projected.column[slot]);
+    hn::Store(hn::MulAdd(Dot(way, axis_y_), scale, packet_.row), d, projected.row[slot]);
     // In units of 2^-24: a coordinate along an axis is within 5 |way|, the depth as well, the height within 5 |r - c|.
     const Vec length = Norm1(way);
-    const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 5.0f), length), inverse, packet.height_error);
-    hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet.place_error)), d,
-              projected.error[v]);
+    const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 5.0f), length), inverse, packet_.height_error);
+    hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet_.place_error)), d,
+              projected.error[slot]);
   }
-}
+
+ private:
+  const Packet& packet_;
+  Vec3 axis_x_, axis_y_, down_;
+};
 
 /// Bits of the columns between low and high, rounded to whole ones within HalfPlane's slack.
 HWY_INLINE UintVec ColumnsBetween(Vec low, Vec high, Vec offset, Vec rest) {
@@ -444,18 +469,135 @@ class Outline {
 
 /// Edges around a patch of triangles, each from a vertex to the next, as the receivers see them in columns and rows.
 struct PatchOutline {
-  static constexpr std::uint32_t kMost = 31;  // and so it winds around nothing more than 15 times
-  std::uint32_t count = 0;
-  std::uint8_t from[kMost + 1], to[kMost + 1];
-  alignas(HWY_MAX_BYTES) float slope[kMost + 1][kMaxLanes], width[kMost + 1][kMaxLanes];  // columns a row; uncertainty
-  std::uint32_t on_row[SampleRows::kMaxRows];  // edges that cross the row for some receiver, as bits
+  static constexpr std::uint32_t kMost = 255;  // and so nothing is wound around more often than 8 bits can say
+  static constexpr float kMostError = 0.02f;  // columns or rows that vertices may lie off
+  std::uint32_t count = 0, fixed = 0;         // the first `fixed` are edges from `from` to `to` for all receivers
+  std::uint8_t from[kMost], to[kMost];        // vertices
+  std::uint16_t positive[kMost], negative[kMost];  // receivers for which others are, and for which they run against that
+  std::uint8_t first_row[kMost], last_row[kMost];  // the edge crosses no others
+  alignas(HWY_MAX_BYTES) float slope[kMost][kMaxLanes], width[kMost][kMaxLanes];  // columns a row; uncertainty
+  std::uint64_t on_row[SampleRows::kMaxRows][kMost / 64 + 1];  // edges that may cross the row
+  bool near_row[kMost];         // an end of the edge lies on a row for some receiver, so far as can be told
+  std::uint32_t crossings = 0;  // most edges on one row: nothing is wound around more often
 };
+
+/// Triangles of one leaf of a group, as bits, as seen by a box of receivers.
+struct LeafSides {
+  std::uint32_t above = 0, below = 0, active = 0;  // as in LeafView
+  std::uint32_t plain = 0;                         // projects onto the light's plane, and well
+};
+
+HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, const BlockerTree::Leaf& leaf, const ReceiverBox& box,
+                                LeafSides& sides) {
+  const Tag d;
+  const vec3 middle = 0.5f * (box.low + box.high);
+  const vec3 half = glm::max(box.high - middle, middle - box.low) * (1.0f + 0x1p-20f);
+  const auto middle_z = static_cast<float>(scene.frame.to_frame(dvec3(middle)).z);
+  const float half_z = std::max(box.shaft.high[2] - middle_z, middle_z - box.shaft.low[2]) + 1e-6f;
+  const float most = PatchOutline::kMostError / std::max(scene.rows->scale, scene.rows->row_scale);
+  const Vec3 normal = Splat(vec3(scene.frame.n));
+  for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(d)) {
+    std::array<Vec3, 3> to_corner;
+    for (std::size_t k = 0; k < 3; ++k) {
+      to_corner[k] = Subtract({hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i),
+                               hn::LoadU(d, leaf.corner[k][2] + i)},
+                              Splat(middle));
+    }
+    FindSides(leaf, i, box.low, box.high, half, to_corner[0], sides);
+    Vec least = hn::Set(d, 1e30f), lowest = least, farthest = hn::Zero(d);
+    for (const Vec3& c : to_corner) {
+      const Vec up = Dot(c, normal);
+      least = hn::Min(least, hn::Neg(hn::Add(up, hn::Set(d, half_z))));
+      lowest = hn::Min(lowest, hn::Add(up, hn::Set(d, middle_z)));
+      farthest = hn::Max(farthest, Norm1(c));
+    }
+    farthest = hn::Add(farthest, hn::Set(d, half.x + half.y + half.z));
+    // As in ProjectOntoLight: bounded, and with a pad of at most `most`; and in front of the light's plane.
+    const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
+    const Vec magnified = hn::Mul(farthest, hn::Set(d, 1e-6f * (box.shaft.high[2] + 4.0f)));
+    const LaneMask good =
+        hn::Le(magnified, hn::Mul(least, hn::Set(d, most - ProjectionPad(box.shaft.low[2]))));
+    const LaneMask before_light = hn::Gt(lowest, hn::Set(d, 1e-4f + scene.rectangles->thickness));
+    sides.plain |= static_cast<std::uint32_t>(Bits(hn::And(hn::And(bounded, good), before_light))) << i;
+  }
+}
+
+/// What the receivers of a cluster have in common about a group. Its patch are the triangles that lie whole between the
+/// receivers and the light, are opaque and nobody's own. A sample is blocked by one of them where their outlines, turned
+/// alike, wind around it, and edges between two of them cancel. What is left are the net edges: fixed ones, the same for
+/// all receivers, and those of triangles that some receivers may see from above and others from below.
+HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& group, const ReceiverBox& box,
+                          ExactScratch& scratch, GroupView& view) {
+  constexpr std::uint16_t kAll = 0xffff;
+  const BlockerTree& tree = *scene.tree;
+  const std::uint32_t first_leaf = group.child[0] & ~BlockerTree::kLeafBit;
+  const auto own_begin = std::lower_bound(scratch.own_places.begin(), scratch.own_places.end(),
+                                          first_leaf * BlockerTree::kWidth),
+             own_end = std::lower_bound(own_begin, scratch.own_places.end(),
+                                        (first_leaf + group.count) * BlockerTree::kWidth);
+  std::uint8_t turns[BlockerTree::kGroupSlots + 1];
+  std::uint16_t positive[BlockerTree::kGroupSlots + 1], negative[BlockerTree::kGroupSlots + 1];
+  for (std::uint32_t k = 0; k < group.count; ++k) {
+    const BlockerTree::Leaf& leaf = tree.leaves[first_leaf + k];
+    LeafSides sides;
+    FindSidesOfLeaf(scene, leaf, box, sides);
+    std::uint32_t plain = sides.active & sides.plain & ~leaf.perforated;
+    for (auto own = own_begin; own != own_end; ++own) {
+      if (*own / BlockerTree::kWidth == first_leaf + k) plain &= ~(1u << *own % BlockerTree::kWidth);
+    }
+    const std::uint32_t known = plain & (sides.above | sides.below);
+    view.patch[k] = static_cast<std::uint16_t>(known);
+    view.turns[k] = static_cast<std::uint16_t>(plain & ~known);
+    view.single[k] = static_cast<std::uint16_t>(sides.active & ~plain);
+    for (std::uint32_t lane = 0; lane < BlockerTree::kWidth; ++lane) {
+      const std::size_t at = BlockerTree::kWidth * k + lane;
+      positive[at] = (known & sides.above) >> lane & 1 ? kAll : 0;
+      negative[at] = (known & sides.below) >> lane & 1 ? kAll : 0;
+      turns[at] = view.turns[k] >> lane & 1;
+    }
+  }
+  positive[BlockerTree::kGroupSlots] = negative[BlockerTree::kGroupSlots] = 0;
+  turns[BlockerTree::kGroupSlots] = 0;
+  NetEdges& net = scratch.net_edges;
+  view.first = static_cast<std::uint32_t>(net.count);
+  net.reserve(net.count + 2 * group.edges + kMaxLanes);
+  const vec3* const vertices = tree.vertices.data() + group.first_vertex;
+  const auto add = [&](const BlockerTree::Edge& edge, std::uint16_t a, std::uint16_t b) {
+    const std::size_t at = net.count++;
+    net.vertex[0][at] = a, net.vertex[1][at] = b;
+    net.triangle[0][at] = edge.left, net.triangle[1][at] = edge.right;
+    for (int axis = 0; axis < 3; ++axis)
+      net.end[0][axis][at] = vertices[a][axis], net.end[1][axis][at] = vertices[b][axis];
+  };
+  const std::span edges(tree.edges.data() + group.first_edge, group.edges);
+  const auto facing = [&](std::uint16_t t) { return (positive[t] & 1) - (negative[t] & 1); };
+  for (const BlockerTree::Edge& edge : edges) {
+    if (turns[edge.left] | turns[edge.right]) continue;
+    for (int c = facing(edge.left) - facing(edge.right); c != 0; c += c > 0 ? -1 : 1)
+      c > 0 ? add(edge, edge.from, edge.to) : add(edge, edge.to, edge.from);
+  }
+  view.fixed = static_cast<std::uint32_t>(net.count) - view.first;
+  for (const BlockerTree::Edge& edge : edges) {
+    if (turns[edge.left] | turns[edge.right]) add(edge, edge.from, edge.to);
+  }
+  view.turning = static_cast<std::uint32_t>(net.count) - view.first - view.fixed;
+  view.known = true;
+  if (view.turning == 0) return;
+  view.facing = static_cast<std::uint32_t>(scratch.facing.size());
+  scratch.facing.insert(scratch.facing.end(), std::begin(positive), std::end(positive));
+  scratch.facing.insert(scratch.facing.end(), std::begin(negative), std::end(negative));
+}
 
 /// A packet at work on its receivers.
 class PacketSolver {
  public:
-  PacketSolver(const ExactScene& scene, KernelReceivers& receivers, ExactScratch& scratch)
-      : scene_(scene), rows_(*scene.rows), receivers_(receivers), scratch_(scratch), counters_(scratch.counters) {}
+  PacketSolver(const ExactScene& scene, const ReceiverBox& cluster, KernelReceivers& receivers, ExactScratch& scratch)
+      : scene_(scene),
+        rows_(*scene.rows),
+        cluster_(cluster),
+        receivers_(receivers),
+        scratch_(scratch),
+        counters_(scratch.counters) {}
 
   HWY_INLINE void Solve(std::size_t first, std::size_t count) {
     if (!Begin(first, count)) return;
@@ -463,11 +605,12 @@ class PacketSolver {
     const float* const low[3] = {scratch_.low[0].data(), scratch_.low[1].data(), scratch_.low[2].data()};
     const float* const high[3] = {scratch_.high[0].data(), scratch_.high[1].data(), scratch_.high[2].data()};
     bool any = false;
+    PictureRanges ranges;
     for (std::size_t i = 0; i < scratch_.leaf.size(); i += lanes) {
-      for (std::uint64_t bits = BoxesOverOpenSamples(rows_, low, high, i, packet_); bits != 0; bits &= bits - 1) {
-        ++scratch_.leaves_tested;
-        const std::uint32_t leaf = scratch_.leaf[i + static_cast<std::size_t>(std::countr_zero(bits))];
-        if (!RasterizeLeaf(scene_.tree->leaves[leaf])) continue;
+      for (std::uint64_t bits = BoxesOverOpenSamples(rows_, low, high, i, packet_, 0, ranges); bits != 0;
+           bits &= bits - 1) {
+        const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
+        if (!RasterizeGroup(scene_.tree->nodes[scratch_.leaf[at]], scratch_.groups[at])) continue;
         any = true;
         if (!FindOpenPart()) {
           StoreMasks();
@@ -481,15 +624,21 @@ class PacketSolver {
  private:
   bool Begin(std::size_t first, std::size_t count);
   bool FindOpenPart();
-  bool RasterizeLeaf(const BlockerTree::Leaf& leaf);
-  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, LaneMask active);
-  std::uint32_t FindPatch(const BlockerTree::Leaf& leaf);
-  HWY_INLINE LaneMask SetOutline(const BlockerTree::Leaf& leaf, std::uint64_t projected);
+  bool RasterizeGroup(const BlockerTree::Node& group, GroupView& view);
+  bool RasterizePatch(const BlockerTree::Node& group, const GroupView& view, const std::uint16_t* patch,
+                      std::uint32_t leaves, bool& added);
+  void FindTurns(const BlockerTree::Node& group, GroupView& view, std::uint32_t leaves, std::uint16_t* certain);
+  bool CollectEdges(const BlockerTree::Node& group, const GroupView& view, std::uint32_t first, std::uint32_t end,
+                    bool turning);
+  HWY_INLINE void SetOutline();
+  HWY_INLINE UintVec SamplesNearEnds(std::size_t e, Vec y, Vec offset, Vec rest) const;
+  template <int kBits>
   HWY_INLINE UintVec WindLine(std::uint32_t line, UintVec& doubtful) const;
-  bool RasterizePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint64_t projected,
-                      LaneMask& not_patched);
-  void SettlePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint32_t line,
+  void SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves, std::uint32_t line,
                    const std::uint32_t* doubtful, std::uint32_t* blocked);
+  const LeafView& ViewLeaf(const BlockerTree::Node& group, std::uint32_t k);
+  bool RasterizeLeaf(const BlockerTree::Leaf& leaf, const LeafView& view, std::uint32_t wanted);
+  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafView& view, std::size_t lane);
   void StoreMasks();
 
   HWY_INLINE void SetPlanes(const BlockerTree::Leaf& leaf, std::size_t lane, PacketTriangle& triangle) const;
@@ -498,6 +647,10 @@ class PacketSolver {
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
   void Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible, std::uint32_t* inside);
 
+  /// How far a row may lie off its place, in rows.
+  float RowSpread() const {
+    return rows_.most_row_offset - rows_.least_row_offset + rows_.deviation * rows_.row_scale + 1e-5f;
+  }
   vec3 Position(std::size_t lane) const {
     const std::size_t i = packet_.first + lane;
     return {receivers_.x[i], receivers_.y[i], receivers_.z[i]};
@@ -505,14 +658,21 @@ class PacketSolver {
 
   const ExactScene& scene_;
   const SampleRows& rows_;
+  const ReceiverBox& cluster_;
   KernelReceivers& receivers_;
   ExactScratch& scratch_;
   KernelCounters& counters_;
   Packet packet_;
   LineSet changed_lines_;
-  LeafView view_;                                 // of the leaf at work
+  PictureRanges leaf_ranges_;                     // of the group at work
+  LeafView views_[BlockerTree::kWidth];           // of its leaves
+  std::uint32_t viewed_ = 0;                      // those that are there
   PatchOutline outline_;                          // of the patch at work
-  ProjectedVertices vertices_;                    // of the leaf at work
+  ProjectedVertices vertices_;                    // of the patch or leaf at work
+  std::uint32_t projected_in_[3 * BlockerTree::kGroupSlots] = {};  // [vertex of a group] call that projected it,
+  std::uint8_t slot_of_[3 * BlockerTree::kGroupSlots];             // and where to
+  std::uint32_t calls_ = 0, slots_ = 0;
+  std::uint32_t in_packet_ = 0;  // its lanes, as bits
   std::optional<TexelLookup> texels_[kMaxLanes];  // of the perforated triangle at work, made when first needed
 };
 
@@ -521,15 +681,9 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   const Tag d;
   const UintTag du;
   packet_.first = first, packet_.count = count;
-  packet_.low = vec3(1e30f), packet_.high = vec3(-1e30f);
-  Shaft& shaft = packet_.shaft;
-  for (int k = 0; k < 3; ++k) shaft.low[k] = 1e30f, shaft.high[k] = -1e30f;
-  for (std::size_t i = 0; i < count; ++i) {
-    const vec3 r = Position(i), p(scene_.frame.to_frame(dvec3(r)));
-    packet_.low = glm::min(packet_.low, r), packet_.high = glm::max(packet_.high, r);
-    for (int k = 0; k < 3; ++k)
-      shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
-  }
+  in_packet_ = (1u << count) - 1;
+  static_cast<ReceiverBox&>(packet_) = ReceiverBox();
+  for (std::size_t i = 0; i < count; ++i) packet_.add(scene_.frame, Position(i));
   packet_.position = {hn::LoadU(d, &receivers_.x[first]), hn::LoadU(d, &receivers_.y[first]),
                       hn::LoadU(d, &receivers_.z[first])};
   packet_.own = hn::LoadU(du, &receivers_.own[first]);
@@ -578,101 +732,212 @@ bool PacketSolver::FindOpenPart() {
   return true;
 }
 
-/// Up to 16 triangles; true where samples were blocked.
-bool PacketSolver::RasterizeLeaf(const BlockerTree::Leaf& leaf) {
-  counters_.pairs_tested += leaf.count * packet_.count;
-  LeafView& view = view_;
-  view.above = view.below = view.bounded = view.active = view.kept = 0;
-  for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(Tag())) ViewTriangles(scene_, leaf, i, packet_, view);
-  if (view.kept == 0) return false;
-  std::uint64_t vertices = 0;
-  for (std::uint32_t rest = view.kept & view.bounded; rest != 0; rest &= rest - 1) {
-    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    for (const auto& vertex : leaf.corner_vertex) vertices |= std::uint64_t{1} << vertex[lane];
+/// Up to 16 leaves; true where samples were blocked.
+bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& view) {
+  const float* const low[3] = {group.low[0], group.low[1], group.low[2]};
+  const float* const high[3] = {group.high[0], group.high[1], group.high[2]};
+  std::uint32_t leaves = 0;
+  for (std::size_t i = 0; i < group.count; i += hn::Lanes(Tag())) {
+    leaves |= static_cast<std::uint32_t>(BoxesOverOpenSamples(rows_, low, high, i, packet_, i, leaf_ranges_)) << i;
   }
-  ProjectVertices(scene_, leaf, vertices, packet_, vertices_);
-  const Tag d;
-  const LaneMask everyone = hn::FirstN(d, packet_.count), none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
+  leaves &= (1u << group.count) - 1;
+  if (leaves == 0) return false;
+  if (!view.known) ViewGroup(scene_, group, cluster_, scratch_, view);
+  scratch_.leaves_tested += static_cast<std::uint64_t>(std::popcount(leaves));
+  viewed_ = 0;
   bool added = false;
-  std::uint32_t in_patch = 0;
-  LaneMask not_patched = none;
-  if (!rows_.place.empty() && std::popcount(view.kept) >= 3) {
-    in_patch = FindPatch(leaf);
-    if (in_patch != 0) added = RasterizePatch(leaf, in_patch, vertices, not_patched);
-  }
-  for (std::uint32_t rest = view.kept; rest != 0; rest &= rest - 1) {
-    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    const LaneMask asked = (in_patch >> lane) & 1 ? not_patched : everyone;
-    if (!hn::AllFalse(d, asked)) added |= RasterizeTriangle(leaf, lane, asked);
+  std::uint16_t patch[BlockerTree::kWidth];
+  FindTurns(group, view, leaves, patch);
+  int in_patch = 0;
+  for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) in_patch += std::popcount(patch[std::countr_zero(rest)]);
+  const bool patched =
+      !rows_.place.empty() && in_patch >= 3 && RasterizePatch(group, view, patch, leaves, added);
+  for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<std::uint32_t>(std::countr_zero(rest));
+    std::uint32_t wanted = view.patch[k] | view.turns[k] | view.single[k];
+    if (patched) wanted &= ~patch[k];
+    if (wanted == 0) continue;
+    const BlockerTree::Leaf& leaf = scene_.tree->leaves[(group.child[0] & ~BlockerTree::kLeafBit) + k];
+    counters_.pairs_tested += leaf.count * packet_.count;
+    added |= RasterizeLeaf(leaf, ViewLeaf(group, k), wanted);
   }
   return added;
 }
 
-/// Triangles that are seen from one side by all receivers, lie whole between them and the whole light, and are opaque:
-/// a sample is blocked where the outlines of the triangles wind around it, and edges between two of them cancel. Fills
-/// outline_; empty where patches of this leaf would not pay, or could wind around a sample 16 times.
-std::uint32_t PacketSolver::FindPatch(const BlockerTree::Leaf& leaf) {
-  const UintTag du;
-  const LeafView& view = view_;
-  std::uint32_t patch = ((view.above & ~leaf.samples_below) | (view.below & ~leaf.samples_above)) & view.bounded &
-                        view.active & ~leaf.perforated;
-  const float most = 0.02f / std::max(rows_.scale, rows_.row_scale);
-  for (std::uint32_t rest = patch; rest != 0; rest &= rest - 1) {
-    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    const bool is_own = !hn::AllFalse(du, hn::Eq(packet_.own, hn::Set(du, leaf.triangle[lane])));
-    if (is_own || view.pad[lane] > most) patch &= ~(1u << lane);
-  }
-  const int wanted = std::popcount(patch & view.kept);
-  if (wanted < 3) return 0;
-  std::uint64_t once[2] = {0, 0}, twice[2] = {0, 0}, thrice = 0;  // uses of edges, by direction
-  for (std::uint32_t rest = patch; rest != 0; rest &= rest - 1) {
-    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    const std::uint32_t turned = (view.below >> lane) & 1;
-    for (const auto& edge : leaf.corner_edge) {
-      const std::uint64_t bit = std::uint64_t{1} << (edge[lane] & ~BlockerTree::kReversed);
-      const std::uint32_t way = (edge[lane] & BlockerTree::kReversed ? 1u : 0u) ^ turned;
-      thrice |= twice[way] & bit;
-      twice[way] |= once[way] & bit;
-      once[way] |= bit;
+/// From which side each receiver sees the triangles that turn. Those of `leaves` for which that is certain for everyone
+/// join the patch, which is returned.
+void PacketSolver::FindTurns(const BlockerTree::Node& group, GroupView& view, std::uint32_t leaves,
+                             std::uint16_t* patch) {
+  const Tag d;
+  const LaneMask everyone = hn::FirstN(d, packet_.count);
+  std::copy_n(view.patch, BlockerTree::kWidth, patch);
+  if (view.turning == 0) return;
+  std::uint16_t* const positive = scratch_.facing.data() + view.facing;
+  std::uint16_t* const negative = positive + BlockerTree::kGroupSlots + 1;
+  for (std::uint32_t k = 0; k < group.count; ++k) {
+    if (view.turns[k] == 0) continue;
+    const bool is_listed = (leaves >> k & 1) != 0;
+    const BlockerTree::Leaf& leaf = scene_.tree->leaves[(group.child[0] & ~BlockerTree::kLeafBit) + k];
+    const bool outside_box =
+        cluster_.low.x > leaf.box_high.x || cluster_.low.y > leaf.box_high.y || cluster_.low.z > leaf.box_high.z ||
+        cluster_.high.x < leaf.box_low.x || cluster_.high.y < leaf.box_low.y || cluster_.high.z < leaf.box_low.z;
+    const std::uint32_t samples_below = leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u);
+    for (std::uint32_t rest = view.turns[k]; rest != 0; rest &= rest - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+      const std::size_t at = BlockerTree::kWidth * k + lane;
+      positive[at] = negative[at] = 0;
+      if (!is_listed) continue;
+      const Vec3 to_corner = Subtract(Splat({leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}),
+                                      packet_.position);
+      const Vec side = Dot(Splat({leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}), to_corner),
+                error = hn::Mul(hn::Set(d, leaf.side_error[lane]), Norm1(to_corner));
+      if (!hn::AllFalse(d, hn::And(everyone, hn::Le(hn::Abs(side), error)))) continue;
+      patch[k] |= static_cast<std::uint16_t>(1u << lane);
+      const auto above = static_cast<std::uint16_t>(Bits(hn::Gt(side, hn::Zero(d))));
+      if (leaf.samples_above >> lane & 1) positive[at] = above;
+      if (samples_below >> lane & 1) negative[at] = static_cast<std::uint16_t>(~above);
     }
   }
-  const std::uint64_t both = once[0] & once[1];
-  if (thrice != 0 || (both & (twice[0] ^ twice[1])) != 0) return 0;
-  outline_.count = 0;
-  for (std::uint32_t way = 0; way < 2; ++way) {
-    const std::uint64_t single = once[way] & ~both;
-    const int uses = std::popcount(single) + std::popcount(single & twice[way]);
-    if (static_cast<int>(outline_.count) + uses > std::min(static_cast<int>(PatchOutline::kMost), 4 * wanted)) return 0;
-    for (std::uint64_t rest = single; rest != 0; rest &= rest - 1) {
-      const auto edge = static_cast<std::size_t>(std::countr_zero(rest));
-      const std::uint8_t a = leaf.edge_vertex[way][edge], b = leaf.edge_vertex[1 - way][edge];
-      outline_.from[outline_.count] = a, outline_.to[outline_.count++] = b;
-      if ((twice[way] >> edge) & 1) outline_.from[outline_.count] = a, outline_.to[outline_.count++] = b;
-    }
-  }
-  return patch;
 }
 
-/// Vertices of the outline, and its edges as the receivers see them. Returns the receivers for which no vertex lies on
-/// a row, so far as can be told.
-HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std::uint64_t projected) {
-  const Tag d;
-  std::uint64_t used = 0;
-  for (std::uint32_t e = 0; e < outline_.count; ++e) used |= std::uint64_t{1} << outline_.from[e];
-  ProjectVertices(scene_, leaf, used & ~projected, packet_, vertices_);
-  const Vec row_offset = hn::Set(d, 0.5f * (rows_.least_row_offset + rows_.most_row_offset));
-  const Vec spread =
-      hn::Set(d, rows_.most_row_offset - rows_.least_row_offset + rows_.deviation * rows_.row_scale + 1e-5f);
-  const Vec row_scale = hn::Set(d, rows_.row_scale), end = hn::Set(d, static_cast<float>(rows_.rows));
-  LaneMask on_row = hn::Lt(end, end);
-  for (std::uint64_t rest = used; rest != 0; rest &= rest - 1) {
-    const auto v = static_cast<std::size_t>(std::countr_zero(rest));
-    const Vec row = hn::Add(hn::Load(d, vertices_.row[v]), row_offset), nearest = hn::Round(row);
-    const Vec error = hn::MulAdd(hn::Load(d, vertices_.error[v]), row_scale, spread);
-    on_row = hn::Or(on_row, hn::And(hn::Le(hn::Abs(hn::Sub(row, nearest)), error),
-                                    hn::And(hn::Ge(nearest, hn::Zero(d)), hn::Lt(nearest, end))));
+/// Leaf `k` of the group, looked at once.
+const LeafView& PacketSolver::ViewLeaf(const BlockerTree::Node& group, std::uint32_t k) {
+  LeafView& view = views_[k];
+  if ((viewed_ >> k & 1) != 0) return view;
+  viewed_ |= 1u << k;
+  const BlockerTree::Leaf& leaf = scene_.tree->leaves[(group.child[0] & ~BlockerTree::kLeafBit) + k];
+  view.above = view.below = view.bounded = view.active = view.kept = 0;
+  for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(Tag())) ViewTriangles(scene_, leaf, i, packet_, view);
+  return view;
+}
+
+/// The triangles of `wanted`, one by one; true where samples were blocked.
+bool PacketSolver::RasterizeLeaf(const BlockerTree::Leaf& leaf, const LeafView& view, std::uint32_t wanted) {
+  const std::uint32_t kept = view.kept & wanted;
+  if (kept == 0) return false;
+  std::uint64_t vertices = 0;
+  for (std::uint32_t rest = kept & view.bounded; rest != 0; rest &= rest - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+    for (const auto& vertex : leaf.corner_vertex) vertices |= std::uint64_t{1} << vertex[lane];
   }
-  std::fill_n(outline_.on_row, rows_.rows, 0u);
+  const VertexProjection projection(scene_, packet_);
+  for (; vertices != 0; vertices &= vertices - 1) {
+    const auto v = static_cast<std::size_t>(std::countr_zero(vertices));
+    projection.Project({leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]}, v, vertices_);
+  }
+  bool added = false;
+  for (std::uint32_t rest = kept; rest != 0; rest &= rest - 1)
+    added |= RasterizeTriangle(leaf, view, static_cast<std::size_t>(std::countr_zero(rest)));
+  return added;
+}
+
+/// Net edges that may matter for what is open: those that cross its rows and do not lie to the right of it. False where
+/// they are too many.
+bool PacketSolver::CollectEdges(const BlockerTree::Node& group, const GroupView& view, std::uint32_t first_edge,
+                                std::uint32_t end, bool turning) {
+  const Tag d;
+  const hn::RebindToSigned<Tag> di;
+  const LightFrame& frame = scene_.frame;
+  const vec3 middle = 0.5f * (packet_.low + packet_.high);
+  const vec3 in_frame(frame.to_frame(dvec3(middle)));
+  float half[3];
+  for (int k = 0; k < 3; ++k)
+    half[k] = std::max(packet_.shaft.high[k] - in_frame[k], in_frame[k] - packet_.shaft.low[k]) + 1e-6f;
+  const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
+  const NetEdges& net = scratch_.net_edges;
+  const VertexProjection projection(scene_, packet_);
+  const std::uint16_t* const positive_of = scratch_.facing.data() + view.facing;
+  const std::uint16_t* const negative_of = positive_of + BlockerTree::kGroupSlots + 1;
+  const auto slot_of = [&](std::uint16_t v) {
+    if (projected_in_[v] != calls_) {
+      projected_in_[v] = calls_;
+      slot_of_[v] = static_cast<std::uint8_t>(slots_);
+      projection.Project(scene_.tree->vertices[group.first_vertex + v], slots_++, vertices_);
+    }
+    return slot_of_[v];
+  };
+  for (std::uint32_t e = first_edge; e < end; e += static_cast<std::uint32_t>(hn::Lanes(d))) {
+    Vec low[2] = {hn::Set(d, 1e30f), hn::Set(d, 1e30f)}, high[2] = {hn::Set(d, -1e30f), hn::Set(d, -1e30f)};
+    for (const auto& v : net.end) {
+      const Vec3 c = Subtract({hn::LoadU(d, &v[0][e]), hn::LoadU(d, &v[1][e]), hn::LoadU(d, &v[2][e])}, Splat(middle));
+      const Vec up = Dot(c, normal), z = hn::Add(up, hn::Set(d, in_frame.z));
+      const Vec w0 = hn::Div(z, hn::Sub(hn::Neg(up), hn::Set(d, half[2]))),
+                w1 = hn::Div(z, hn::Sub(hn::Set(d, half[2]), up));
+      for (int axis = 0; axis < 2; ++axis) {
+        const Vec away = Dot(c, axes[axis]), place = hn::Add(away, hn::Set(d, in_frame[axis]));
+        const Vec a = hn::Sub(away, hn::Set(d, half[axis])), b = hn::Add(away, hn::Set(d, half[axis]));
+        const Vec a0 = hn::Mul(a, w0), a1 = hn::Mul(a, w1), b0 = hn::Mul(b, w0), b1 = hn::Mul(b, w1);
+        low[axis] = hn::Min(low[axis], hn::Add(place, hn::Min(hn::Min(a0, a1), hn::Min(b0, b1))));
+        high[axis] = hn::Max(high[axis], hn::Add(place, hn::Max(hn::Max(a0, a1), hn::Max(b0, b1))));
+      }
+    }
+    // Vertices lie off by at most PatchOutline::kMostError columns and rows.
+    const Vec pad = hn::Set(d, PatchOutline::kMostError / std::min(rows_.scale, rows_.row_scale));
+    const Rectangle& open = packet_.shaft.light;
+    const LaneMask may = hn::And(hn::And(hn::Le(hn::Sub(low[1], pad), hn::Set(d, open.high_v)),
+                                         hn::Ge(hn::Add(high[1], pad), hn::Set(d, open.low_v))),
+                                 hn::Le(hn::Sub(low[0], pad), hn::Set(d, open.high_u)));
+    std::uint64_t bits = Bits(may) & ((std::uint64_t{1} << std::min<std::size_t>(hn::Lanes(d), end - e)) - 1);
+    std::uint16_t positive[kMaxLanes] = {}, negative[kMaxLanes] = {};
+    std::uint32_t twice = 0;
+    if (turning) {
+      for (std::uint64_t rest = bits; rest != 0; rest &= rest - 1) {
+        const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+        const std::uint16_t left = net.triangle[0][e + lane], right = net.triangle[1][e + lane];
+        const std::uint32_t lp = positive_of[left], ln = negative_of[left], rp = positive_of[right],
+                            rn = negative_of[right];
+        const std::uint32_t plus = (lp & ~rp) | (rn & ~ln), minus = (ln & ~rn) | (rp & ~lp);
+        positive[lane] = static_cast<std::uint16_t>(plus), negative[lane] = static_cast<std::uint16_t>(minus);
+        if (((plus | minus) & in_packet_) == 0) bits &= ~(std::uint64_t{1} << lane);
+        twice |= std::uint32_t{(((lp & rn) | (ln & rp)) & in_packet_) != 0} << lane;
+      }
+    }
+    if (bits == 0) continue;
+    if (outline_.count + static_cast<std::uint32_t>(std::popcount(twice)) + static_cast<std::uint32_t>(std::popcount(bits)) > PatchOutline::kMost ||
+        slots_ + 2 * static_cast<std::uint32_t>(std::popcount(bits)) > ProjectedVertices::kMost)
+      return false;
+    alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
+    const Vec row_scale = hn::Set(d, rows_.row_scale), top = hn::Set(d, static_cast<float>(rows_.rows) - 1.0f);
+    const auto row = [&](Vec v, float offset) HWY_ATTR {
+      return hn::ConvertTo(di, hn::Min(hn::Max(hn::MulAdd(v, row_scale, hn::Set(d, offset)), hn::Zero(d)), top));
+    };
+    hn::Store(row(hn::Sub(low[1], pad), rows_.least_row_offset), di, first);
+    hn::Store(row(hn::Add(high[1], pad), rows_.most_row_offset), di, last);
+    for (; bits != 0; bits &= bits - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
+      const std::uint32_t i = outline_.count++;
+      outline_.from[i] = slot_of(net.vertex[0][e + lane]), outline_.to[i] = slot_of(net.vertex[1][e + lane]);
+      outline_.first_row[i] = static_cast<std::uint8_t>(first[lane]);
+      outline_.last_row[i] = static_cast<std::uint8_t>(last[lane]);
+      if (!turning) continue;
+      outline_.positive[i] = positive[lane], outline_.negative[i] = negative[lane];
+      if ((twice >> lane & 1) == 0) continue;
+      const std::uint16_t left = net.triangle[0][e + lane], right = net.triangle[1][e + lane];
+      const std::uint32_t second = outline_.count++;
+      outline_.from[second] = outline_.from[i], outline_.to[second] = outline_.to[i];
+      outline_.first_row[second] = outline_.first_row[i], outline_.last_row[second] = outline_.last_row[i];
+      outline_.positive[second] = static_cast<std::uint16_t>(positive_of[left] & negative_of[right]);
+      outline_.negative[second] = static_cast<std::uint16_t>(negative_of[left] & positive_of[right]);
+    }
+  }
+  return true;
+}
+
+/// The edges as the receivers see them.
+HWY_INLINE void PacketSolver::SetOutline() {
+  const Tag d;
+  const Vec row_scale = hn::Set(d, rows_.row_scale);
+  const Vec row_offset = hn::Set(d, 0.5f * (rows_.least_row_offset + rows_.most_row_offset));
+  const Vec spread = hn::Set(d, RowSpread());
+  for (std::uint32_t row = 0; row < rows_.rows; ++row) {
+    for (std::uint64_t& word : outline_.on_row[row]) word = 0;
+  }
+  bool near[ProjectedVertices::kMost];
+  for (std::uint32_t v = 0; v < slots_; ++v) {
+    const Vec row = hn::Add(hn::Load(d, vertices_.row[v]), row_offset);
+    const Vec error = hn::MulAdd(hn::Load(d, vertices_.error[v]), row_scale, spread);
+    near[v] = !hn::AllFalse(d, hn::Le(hn::Abs(hn::Sub(row, hn::Round(row))), error));
+  }
   for (std::uint32_t e = 0; e < outline_.count; ++e) {
     const std::size_t a = outline_.from[e], b = outline_.to[e];
     const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
@@ -685,21 +950,47 @@ HWY_INLINE LaneMask PacketSolver::SetOutline(const BlockerTree::Leaf& leaf, std:
     width = hn::Add(width, hn::Set(d, 0x1p-16f));
     hn::Store(slope, d, outline_.slope[e]);
     hn::Store(width, d, outline_.width[e]);
-    // Edges to the right of the picture hide nothing of it.
-    const Vec left = hn::Sub(hn::Min(xa, hn::Add(xa, dx)), width), yb = hn::Add(ya, dy);
-    if (hn::AllTrue(d, hn::Gt(left, hn::Set(d, static_cast<float>(rows_.columns) - rows_.least_offset)))) continue;
-    const float low = hn::GetLane(hn::MinOfLanes(d, hn::Min(ya, yb))),
-                high = hn::GetLane(hn::MaxOfLanes(d, hn::Max(ya, yb)));
-    const auto first = static_cast<std::int32_t>(std::max(low + rows_.least_row_offset - 1e-3f, 0.0f));
-    const float last = std::min(high + rows_.most_row_offset + 1e-3f, static_cast<float>(rows_.rows) - 1.0f);
-    for (std::int32_t row = first; static_cast<float>(row) <= last; ++row) outline_.on_row[row] |= 1u << e;
+    outline_.near_row[e] = near[a] || near[b];
+    for (std::uint32_t row = outline_.first_row[e]; row <= outline_.last_row[e]; ++row)
+      outline_.on_row[row][e / 64] |= std::uint64_t{1} << (e % 64);
   }
-  return hn::Not(on_row);
+  int most = 0;
+  for (std::uint32_t row = 0; row < rows_.rows; ++row) {
+    int count = 0;
+    for (const std::uint64_t word : outline_.on_row[row]) count += std::popcount(word);
+    most = std::max(most, count);
+  }
+  outline_.crossings = static_cast<std::uint32_t>(most);
 }
 
-/// Numbers of four bits, one for each sample of a line.
+/// Samples of row y that an edge passes so near to, for receivers for which one of its ends lies on the row so far as can
+/// be told, that its crossing the row or not is uncertain: within the errors of the ends the edge may turn.
+HWY_INLINE UintVec PacketSolver::SamplesNearEnds(std::size_t e, Vec y, Vec offset, Vec rest) const {
+  const Tag d;
+  const std::size_t a = outline_.from[e], b = outline_.to[e];
+  const Vec row_scale = hn::Set(d, rows_.row_scale), spread = hn::Set(d, RowSpread());
+  const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
+            xb = hn::Load(d, vertices_.column[b]), yb = hn::Load(d, vertices_.row[b]);
+  const Vec error_a = hn::Load(d, vertices_.error[a]), error_b = hn::Load(d, vertices_.error[b]);
+  const Vec off_a = hn::MulAdd(error_a, row_scale, spread), off_b = hn::MulAdd(error_b, row_scale, spread);
+  const LaneMask near = hn::Or(hn::Le(hn::Abs(hn::Sub(ya, y)), off_a), hn::Le(hn::Abs(hn::Sub(yb, y)), off_b));
+  const Vec off = hn::Add(off_a, off_b), slope = hn::Load(d, outline_.slope[e]);
+  const Vec x = hn::MulAdd(slope, hn::Sub(y, ya), xa);
+  const Vec reach = hn::MulAdd(hn::Abs(slope), off, hn::Load(d, outline_.width[e]));
+  // The edge itself, and what its ends may lie off in columns.
+  Vec pad = hn::Mul(hn::Add(hn::Max(error_a, error_b), hn::Set(d, rows_.deviation)), hn::Set(d, rows_.scale));
+  pad = hn::Add(pad, hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(xb)), hn::Set(d, 0x1p-20f), hn::Set(d, 0x1p-15f)));
+  const Vec low = hn::Sub(hn::Min(xa, xb), pad), high = hn::Add(hn::Max(xa, xb), pad);
+  const LaneMask level = hn::Le(hn::Abs(hn::Sub(ya, yb)), hn::Mul(off, hn::Set(d, 4.0f)));
+  const Vec from = hn::IfThenElse(level, low, hn::Max(low, hn::Sub(x, reach))),
+            to = hn::IfThenElse(level, high, hn::Min(high, hn::Add(x, reach)));
+  return hn::IfThenElseZero(hn::RebindMask(UintTag(), near), ColumnsBetween(from, to, offset, rest));
+}
+
+/// Numbers of a few bits, one for each sample of a line.
+template <int kBits>
 struct WindingNumbers {
-  UintVec bit[4];
+  UintVec bit[kBits];
   HWY_INLINE void Add(UintVec one) {
     for (UintVec& b : bit) {
       const UintVec carry = hn::And(b, one);
@@ -712,9 +1003,15 @@ struct WindingNumbers {
       b = hn::Xor(b, one), one = borrow;
     }
   }
+  HWY_INLINE UintVec Any() const {
+    UintVec any = bit[0];
+    for (int i = 1; i < kBits; ++i) any = hn::Or(any, bit[i]);
+    return any;
+  }
 };
 
 /// One line of a patch: the samples that it winds around, and those so near to an outline that this is not certain.
+template <int kBits>
 HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful) const {
   const Tag d;
   const UintTag du;
@@ -722,101 +1019,135 @@ HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful)
   const Vec y = hn::Set(d, rows_.place[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
   const Vec shifter = hn::Set(d, 0x1p23f), half = hn::Set(d, 0.5f);
   const UintVec zero = hn::Zero(du), ones = hn::Set(du, ~0u), shifter_bits = hn::Set(du, 0x4b000000u);
-  WindingNumbers winding{{zero, zero, zero, zero}};
+  WindingNumbers<kBits> winding;
+  for (UintVec& b : winding.bit) b = zero;
   doubtful = zero;
-  for (std::uint32_t edges = outline_.on_row[line % rows_.rows]; edges != 0; edges &= edges - 1) {
-    const auto e = static_cast<std::size_t>(std::countr_zero(edges));
-    const std::size_t a = outline_.from[e], b = outline_.to[e];
-    const Vec ya = hn::Load(d, vertices_.row[a]);
-    const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
-    const LaneMask crossing = hn::Xor(behind, before);
-    const Vec x = hn::MulAdd(hn::Load(d, outline_.slope[e]), hn::Sub(y, ya), hn::Load(d, vertices_.column[a]));
-    const Vec place = hn::Min(hn::Max(hn::Add(x, offset), hn::Zero(d)), hn::Set(d, 33.0f));
-    const Vec from = hn::Add(place, shifter);
-    const Vec width = hn::Load(d, outline_.width[e]);
-    const Vec off = hn::Abs(hn::Sub(place, hn::Sub(from, shifter)));  // a half where x is a column
-    const LaneMask unsure = hn::And(crossing, hn::Ge(off, hn::Sub(half, width)));
-    if (!hn::AllFalse(d, unsure)) {
-      doubtful =
-          hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure),
-                                              ColumnsBetween(hn::Sub(x, width), hn::Add(x, width), offset, rest)));
-    }
-    const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits);
+  for (std::size_t word = 0; word < std::size(outline_.on_row[0]); ++word) {
+    for (std::uint64_t edges = outline_.on_row[line % rows_.rows][word]; edges != 0; edges &= edges - 1) {
+      const std::size_t e = 64 * word + static_cast<std::size_t>(std::countr_zero(edges));
+      const std::size_t a = outline_.from[e], b = outline_.to[e];
+      const Vec ya = hn::Load(d, vertices_.row[a]);
+      const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
+      LaneMask crossing = hn::Xor(behind, before);
+      if (e >= outline_.fixed)
+        crossing = hn::And(crossing, LanesFromBits(outline_.positive[e] | outline_.negative[e], 0));
+      if (outline_.near_row[e]) {
+        UintVec near = SamplesNearEnds(e, y, offset, rest);
+        if (e >= outline_.fixed) {
+          near = hn::IfThenElseZero(
+              hn::RebindMask(du, LanesFromBits(outline_.positive[e] | outline_.negative[e], 0)), near);
+        }
+        doubtful = hn::Or(doubtful, near);
+      }
+      if (hn::AllFalse(d, crossing)) continue;
+      const Vec x = hn::MulAdd(hn::Load(d, outline_.slope[e]), hn::Sub(y, ya), hn::Load(d, vertices_.column[a]));
+      const Vec place = hn::Min(hn::Max(hn::Add(x, offset), hn::Zero(d)), hn::Set(d, 33.0f));
+      const Vec from = hn::Add(place, shifter);
+      const Vec width = hn::Load(d, outline_.width[e]);
+      const Vec off = hn::Abs(hn::Sub(place, hn::Sub(from, shifter)));  // a half where x is a column
+      const LaneMask unsure = hn::And(crossing, hn::Ge(off, hn::Sub(half, width)));
+      if (!hn::AllFalse(d, unsure)) {
+        doubtful =
+            hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure),
+                                                ColumnsBetween(hn::Sub(x, width), hn::Add(x, width), offset, rest)));
+      }
+      const UintVec first = hn::Sub(hn::BitCast(du, from), shifter_bits);
 #if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
-    const UintVec beyond = hn::Shl(ones, first);
+      const UintVec beyond = hn::Shl(ones, first);
 #else
-    const UintVec beyond =
-        hn::IfThenElseZero(hn::Lt(first, hn::Set(du, 32u)), hn::Shl(ones, hn::And(first, hn::Set(du, 31u))));
+      const UintVec beyond =
+          hn::IfThenElseZero(hn::Lt(first, hn::Set(du, 32u)), hn::Shl(ones, hn::And(first, hn::Set(du, 31u))));
 #endif
-    const LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
-    if (!hn::AllFalse(d, down)) winding.Add(hn::IfThenElseZero(hn::RebindMask(du, down), beyond));
-    if (!hn::AllFalse(d, up)) winding.Subtract(hn::IfThenElseZero(hn::RebindMask(du, up), beyond));
+      LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
+      if (e >= outline_.fixed) {
+        const LaneMask positive = LanesFromBits(outline_.positive[e], 0), negative = LanesFromBits(outline_.negative[e], 0);
+        const LaneMask turned_down = hn::Or(hn::And(down, positive), hn::And(up, negative));
+        up = hn::Or(hn::And(up, positive), hn::And(down, negative)), down = turned_down;
+      }
+      if (!hn::AllFalse(d, down)) winding.Add(hn::IfThenElseZero(hn::RebindMask(du, down), beyond));
+      if (!hn::AllFalse(d, up)) winding.Subtract(hn::IfThenElseZero(hn::RebindMask(du, up), beyond));
+    }
   }
-  return hn::Or(hn::Or(winding.bit[0], winding.bit[1]), hn::Or(winding.bit[2], winding.bit[3]));
+  return winding.Any();
 }
 
 /// Doubtful samples of a line by the exact predicate: does a triangle of the patch block them?
-void PacketSolver::SettlePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint32_t line,
-                               const std::uint32_t* doubtful, std::uint32_t* blocked) {
+void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves,
+                               std::uint32_t line, const std::uint32_t* doubtful, std::uint32_t* blocked) {
+  const auto row = static_cast<std::int32_t>(line % rows_.rows);
+  const auto within = [&](const PictureRanges& ranges, std::size_t i, std::int32_t column) {
+    return row >= ranges.row[0][i] && row <= ranges.row[1][i] && column >= ranges.column[0][i] &&
+           column <= ranges.column[1][i];
+  };
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     const std::size_t first =
         std::size_t{receivers_.set[packet_.first + lane]} * scene_.samples->padded + rows_.first_sample(line);
     for (std::uint32_t rest = doubtful[lane]; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(rest));
+      const auto column = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord + bit);
       bool is_blocked = false;
-      for (std::uint32_t t = patch; t != 0 && !is_blocked; t &= t - 1) {
-        const auto k = static_cast<std::size_t>(std::countr_zero(t));
-        const PictureRange range(rows_, view_.ranges, k);
-        const auto row = static_cast<std::int32_t>(line % rows_.rows),
-                   column = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord + bit);
-        if (row < range.first_row || row > range.last_row || column < range.first_column || column > range.last_column)
-          continue;
-        ++counters_.exact_fallbacks;
-        const auto& corner = scene_.tree->blockers[leaf.first + k].corner;
-        is_blocked = blocks(corner[0], corner[1], corner[2], Position(lane), scene_.samples->points[first + bit]);
+      for (std::uint32_t some = leaves; some != 0 && !is_blocked; some &= some - 1) {
+        const auto k = static_cast<std::uint32_t>(std::countr_zero(some));
+        if (patch[k] == 0 || !within(leaf_ranges_, k, column)) continue;
+        const BlockerTree::Leaf& leaf = scene_.tree->leaves[(group.child[0] & ~BlockerTree::kLeafBit) + k];
+        const LeafView& seen = ViewLeaf(group, k);
+        for (std::uint32_t t = patch[k]; t != 0 && !is_blocked; t &= t - 1) {
+          const auto i = static_cast<std::size_t>(std::countr_zero(t));
+          if (!within(seen.ranges, i, column)) continue;
+          ++counters_.exact_fallbacks;
+          const auto& corner = scene_.tree->blockers[leaf.first + i].corner;
+          is_blocked = blocks(corner[0], corner[1], corner[2], Position(lane), scene_.samples->points[first + bit]);
+        }
       }
       blocked[lane] |= std::uint32_t{is_blocked} << bit;
     }
   }
 }
 
-/// A patch into all pictures but those of `not_patched`, which need its triangles one by one.
-bool PacketSolver::RasterizePatch(const BlockerTree::Leaf& leaf, std::uint32_t patch, std::uint64_t projected,
-                                  LaneMask& not_patched) {
-  const Tag d;
+/// The group's patch into all pictures; false where its triangles must be taken one by one.
+bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupView& view, const std::uint16_t* patch,
+                                  std::uint32_t leaves, bool& added) {
   const UintTag du;
-  const LaneMask patched = hn::And(hn::FirstN(d, packet_.count), SetOutline(leaf, projected));
-  not_patched = hn::AndNot(patched, hn::FirstN(d, packet_.count));
+  outline_.count = slots_ = 0;
+  ++calls_;
+  const std::uint32_t turning = view.first + view.fixed;
+  if (!CollectEdges(group, view, view.first, turning, false)) return false;
+  outline_.fixed = outline_.count;
+  if (!CollectEdges(group, view, turning, turning + view.turning, true)) return false;
+  if (outline_.count == 0) return true;
+  SetOutline();
   LineSet lines;
-  for (std::uint32_t rest = patch & view_.kept; rest != 0; rest &= rest - 1) {
-    PictureRange(rows_, view_.ranges, static_cast<std::size_t>(std::countr_zero(rest)))
-        .for_open_lines(rows_, packet_, [&](std::uint32_t line) {
-          lines.add(line);
-          return false;
-        });
+  for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<std::size_t>(std::countr_zero(rest));
+    if (patch[k] == 0) continue;
+    PictureRange(rows_, leaf_ranges_, k).for_open_lines(rows_, packet_, [&](std::uint32_t line) {
+      lines.add(line);
+      return false;
+    });
   }
   ++counters_.pairs_sampled;
-  const UintVec wanted = hn::VecFromMask(du, hn::RebindMask(du, patched));
-  bool added = false;
+  bool any = false;
   lines.for_each([&](std::uint32_t line) HWY_ATTR {
-    const UintVec open = hn::Load(du, packet_.open[line]), asked = hn::And(open, wanted);
+    const UintVec open = hn::Load(du, packet_.open[line]);
     UintVec doubtful;
     ++counters_.sample_tests;
-    UintVec blocked = hn::And(WindLine(line, doubtful), asked);
-    doubtful = hn::And(doubtful, asked);
+    UintVec blocked =
+        hn::And(outline_.crossings > 15 ? WindLine<8>(line, doubtful) : WindLine<4>(line, doubtful), open);
+    doubtful = hn::And(doubtful, open);
     if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
       alignas(HWY_MAX_BYTES) std::uint32_t in_doubt[kMaxLanes], does[kMaxLanes];
       hn::Store(doubtful, du, in_doubt), hn::Store(hn::AndNot(doubtful, blocked), du, does);
-      SettlePatch(leaf, patch, line, in_doubt, does);
+      SettlePatch(group, patch, leaves, line, in_doubt, does);
       blocked = hn::Load(du, does);
     }
     if (hn::AllTrue(du, hn::Eq(blocked, hn::Zero(du)))) return;
     hn::Store(hn::AndNot(blocked, open), du, packet_.open[line]);
     changed_lines_.add(line);
-    added = true;
+    any = true;
   });
-  counters_.pairs_necessary += added;
-  return added;
+  counters_.pairs_necessary += any;
+  added |= any;
+  return true;
 }
 
 /// The planes through receivers and edges, and the triangle's own where it cuts the light.
@@ -941,18 +1272,19 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Li
   return added;
 }
 
-/// One triangle into the pictures of the receivers in `active`; true where samples were blocked.
-bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t lane, LaneMask active) {
+/// One triangle into all pictures; true where samples were blocked.
+bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafView& view, std::size_t lane) {
   const Tag d;
   const UintTag du;
-  const PictureRange range(rows_, view_.ranges, lane);
-  active = hn::And(active, hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
+  const PictureRange range(rows_, view.ranges, lane);
+  LaneMask active = hn::And(hn::FirstN(d, packet_.count),
+                            hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
   LineSet lines;
-  if ((view_.bounded >> lane) & 1) {
+  if ((view.bounded >> lane) & 1) {
     const std::array<std::uint8_t, 3> corner = {leaf.corner_vertex[0][lane], leaf.corner_vertex[1][lane],
                                                 leaf.corner_vertex[2][lane]};
     active =
-        hn::And(active, ReceiversOverOpenSamples(rows_, corner, view_.pad[lane], vertices_, range, packet_, lines));
+        hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[lane], vertices_, range, packet_, lines));
   } else {
     range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
       lines.add(line);
@@ -968,7 +1300,7 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, std::size_t 
     triangle.corner[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
   }
   SetPlanes(leaf, lane, triangle);
-  const bool above = (view_.above >> lane) & 1, below = (view_.below >> lane) & 1;
+  const bool above = (view.above >> lane) & 1, below = (view.below >> lane) & 1;
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
   LaneMask is_below = below ? hn::Not(none) : none;
   if (!above && !below) {
@@ -996,9 +1328,22 @@ void PacketSolver::StoreMasks() {
 
 void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                   ExactScratch& scratch) {
-  if (!ListLeaves(scene, begin, end, receivers, scratch)) return;
+  if (!ListLeaves<true>(scene, begin, end, receivers, scratch)) return;
   const std::size_t lanes = hn::Lanes(Tag());
-  PacketSolver solver(scene, receivers, scratch);
+  ReceiverBox cluster;
+  scratch.own_places.clear();
+  const std::vector<std::uint32_t>& place = scene.tree->place;
+  for (std::size_t i = begin; i < end; ++i) {
+    cluster.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
+    if (receivers.own[i] < place.size() && (i == begin || receivers.own[i] != receivers.own[i - 1]))
+      scratch.own_places.push_back(place[receivers.own[i]]);
+  }
+  std::sort(scratch.own_places.begin(), scratch.own_places.end());
+  if (scratch.groups.size() < scratch.leaf.size()) scratch.groups.resize(scratch.leaf.size());
+  for (GroupView& view : scratch.groups) view.known = false;
+  scratch.net_edges.count = 0;
+  scratch.facing.clear();
+  PacketSolver solver(scene, cluster, receivers, scratch);
   for (std::size_t i = begin; i < end; i += lanes) solver.Solve(i, std::min(lanes, end - i));
 }
 
