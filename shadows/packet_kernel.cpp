@@ -477,8 +477,9 @@ struct PatchOutline {
   std::uint8_t first_row[kMost], last_row[kMost];  // the edge crosses no others
   alignas(HWY_MAX_BYTES) float slope[kMost][kMaxLanes], width[kMost][kMaxLanes];  // columns a row; uncertainty
   std::uint64_t on_row[SampleRows::kMaxRows][kMost / 64 + 1];  // edges that may cross the row
+  std::uint64_t left_on_row[SampleRows::kMaxRows][kMost / 64 + 1];  // the same, of edges to the left of all that is open
+  bool left[kMost];
   bool near_row[kMost];         // an end of the edge lies on a row for some receiver, so far as can be told
-  std::uint32_t crossings = 0;  // most edges on one row: nothing is wound around more often
 };
 
 /// Triangles of one leaf of a group, as bits, as seen by a box of receivers.
@@ -632,8 +633,16 @@ class PacketSolver {
                     bool turning);
   HWY_INLINE void SetOutline();
   HWY_INLINE UintVec SamplesNearEnds(std::size_t e, Vec y, Vec offset, Vec rest) const;
-  template <int kBits>
+  /// How the edge crosses a row, by receiver.
+  HWY_INLINE void Turn(std::size_t e, LaneMask& down, LaneMask& up) const {
+    const LaneMask positive = LanesFromBits(outline_.positive[e], 0), negative = LanesFromBits(outline_.negative[e], 0);
+    const LaneMask turned_down = hn::Or(hn::And(down, positive), hn::And(up, negative));
+    up = hn::Or(hn::And(up, positive), hn::And(down, negative)), down = turned_down;
+  }
+  HWY_INLINE hn::Vec<IntTag> WindLeft(std::uint32_t line) const;
   HWY_INLINE UintVec WindLine(std::uint32_t line, UintVec& doubtful) const;
+  template <int kBits>
+  HWY_INLINE UintVec WindAround(std::uint32_t line, hn::Vec<IntTag> around, UintVec& doubtful) const;
   void SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves, std::uint32_t line,
                    const std::uint32_t* doubtful, std::uint32_t* blocked);
   const LeafView& ViewLeaf(const BlockerTree::Node& group, std::uint32_t k);
@@ -877,6 +886,7 @@ bool PacketSolver::CollectEdges(const BlockerTree::Node& group, const GroupView&
     const LaneMask may = hn::And(hn::And(hn::Le(hn::Sub(low[1], pad), hn::Set(d, open.high_v)),
                                          hn::Ge(hn::Add(high[1], pad), hn::Set(d, open.low_v))),
                                  hn::Le(hn::Sub(low[0], pad), hn::Set(d, open.high_u)));
+    const std::uint64_t beside = Bits(hn::Lt(hn::Add(high[0], pad), hn::Set(d, open.low_u)));
     std::uint64_t bits = Bits(may) & ((std::uint64_t{1} << std::min<std::size_t>(hn::Lanes(d), end - e)) - 1);
     std::uint16_t positive[kMaxLanes] = {}, negative[kMaxLanes] = {};
     std::uint32_t twice = 0;
@@ -909,12 +919,14 @@ bool PacketSolver::CollectEdges(const BlockerTree::Node& group, const GroupView&
       outline_.from[i] = slot_of(net.vertex[0][e + lane]), outline_.to[i] = slot_of(net.vertex[1][e + lane]);
       outline_.first_row[i] = static_cast<std::uint8_t>(first[lane]);
       outline_.last_row[i] = static_cast<std::uint8_t>(last[lane]);
+      outline_.left[i] = (beside >> lane & 1) != 0;
       if (!turning) continue;
       outline_.positive[i] = positive[lane], outline_.negative[i] = negative[lane];
       if ((twice >> lane & 1) == 0) continue;
       const std::uint16_t left = net.triangle[0][e + lane], right = net.triangle[1][e + lane];
       const std::uint32_t second = outline_.count++;
       outline_.from[second] = outline_.from[i], outline_.to[second] = outline_.to[i];
+      outline_.left[second] = outline_.left[i];
       outline_.first_row[second] = outline_.first_row[i], outline_.last_row[second] = outline_.last_row[i];
       outline_.positive[second] = static_cast<std::uint16_t>(positive_of[left] & negative_of[right]);
       outline_.negative[second] = static_cast<std::uint16_t>(negative_of[left] & positive_of[right]);
@@ -931,6 +943,7 @@ HWY_INLINE void PacketSolver::SetOutline() {
   const Vec spread = hn::Set(d, RowSpread());
   for (std::uint32_t row = 0; row < rows_.rows; ++row) {
     for (std::uint64_t& word : outline_.on_row[row]) word = 0;
+    for (std::uint64_t& word : outline_.left_on_row[row]) word = 0;
   }
   bool near[ProjectedVertices::kMost];
   for (std::uint32_t v = 0; v < slots_; ++v) {
@@ -939,6 +952,10 @@ HWY_INLINE void PacketSolver::SetOutline() {
     near[v] = !hn::AllFalse(d, hn::Le(hn::Abs(hn::Sub(row, hn::Round(row))), error));
   }
   for (std::uint32_t e = 0; e < outline_.count; ++e) {
+    auto& on_row = outline_.left[e] ? outline_.left_on_row : outline_.on_row;
+    for (std::uint32_t row = outline_.first_row[e]; row <= outline_.last_row[e]; ++row)
+      on_row[row][e / 64] |= std::uint64_t{1} << (e % 64);
+    if (outline_.left[e]) continue;
     const std::size_t a = outline_.from[e], b = outline_.to[e];
     const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
               dx = hn::Sub(hn::Load(d, vertices_.column[b]), xa), dy = hn::Sub(hn::Load(d, vertices_.row[b]), ya);
@@ -951,16 +968,7 @@ HWY_INLINE void PacketSolver::SetOutline() {
     hn::Store(slope, d, outline_.slope[e]);
     hn::Store(width, d, outline_.width[e]);
     outline_.near_row[e] = near[a] || near[b];
-    for (std::uint32_t row = outline_.first_row[e]; row <= outline_.last_row[e]; ++row)
-      outline_.on_row[row][e / 64] |= std::uint64_t{1} << (e % 64);
   }
-  int most = 0;
-  for (std::uint32_t row = 0; row < rows_.rows; ++row) {
-    int count = 0;
-    for (const std::uint64_t word : outline_.on_row[row]) count += std::popcount(word);
-    most = std::max(most, count);
-  }
-  outline_.crossings = static_cast<std::uint32_t>(most);
 }
 
 /// Samples of row y that an edge passes so near to, for receivers for which one of its ends lies on the row so far as can
@@ -1010,17 +1018,54 @@ struct WindingNumbers {
   }
 };
 
+/// How often the edges to the left of what is open wind around a line.
+HWY_INLINE hn::Vec<IntTag> PacketSolver::WindLeft(std::uint32_t line) const {
+  const Tag d;
+  const IntTag di;
+  const Vec y = hn::Set(d, rows_.place[line]);
+  auto around = hn::Zero(di);
+  const auto one = hn::Set(di, 1);
+  for (std::size_t word = 0; word < std::size(outline_.left_on_row[0]); ++word) {
+    for (std::uint64_t edges = outline_.left_on_row[line % rows_.rows][word]; edges != 0; edges &= edges - 1) {
+      const std::size_t e = 64 * word + static_cast<std::size_t>(std::countr_zero(edges));
+      const LaneMask behind = hn::Le(hn::Load(d, vertices_.row[outline_.from[e]]), y),
+                     before = hn::Le(hn::Load(d, vertices_.row[outline_.to[e]]), y);
+      LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
+      if (e >= outline_.fixed) Turn(e, down, up);
+      around = hn::Add(around, hn::IfThenElseZero(hn::RebindMask(di, down), one));
+      around = hn::Sub(around, hn::IfThenElseZero(hn::RebindMask(di, up), one));
+    }
+  }
+  return around;
+}
+
 /// One line of a patch: the samples that it winds around, and those so near to an outline that this is not certain.
-template <int kBits>
 HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful) const {
+  const IntTag di;
+  const auto around = WindLeft(line);
+  // Nothing is wound around more often than by these and all other edges of the row.
+  int others = 0;
+  for (const std::uint64_t word : outline_.on_row[line % rows_.rows]) others += std::popcount(word);
+  return hn::AllTrue(di, hn::Lt(around, hn::Set(di, 16 - others))) ? WindAround<4>(line, around, doubtful)
+                                                                   : WindAround<8>(line, around, doubtful);
+}
+
+/// The same, beginning with the number of times that edges to the left wind around the line. The sums are right modulo
+/// 2^kBits, and final ones are less than that.
+template <int kBits>
+HWY_INLINE UintVec PacketSolver::WindAround(std::uint32_t line, hn::Vec<IntTag> around, UintVec& doubtful) const {
   const Tag d;
   const UintTag du;
   const PictureLines& l = *packet_.lines;
   const Vec y = hn::Set(d, rows_.place[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
   const Vec shifter = hn::Set(d, 0x1p23f), half = hn::Set(d, 0.5f);
   const UintVec zero = hn::Zero(du), ones = hn::Set(du, ~0u), shifter_bits = hn::Set(du, 0x4b000000u);
+  doubtful = zero;
   WindingNumbers<kBits> winding;
-  for (UintVec& b : winding.bit) b = zero;
+  for (int i = 0; i < kBits; ++i) {
+    winding.bit[i] =
+        hn::IfThenElse(hn::TestBit(hn::BitCast(du, around), hn::Set(du, 1u << i)), ones, zero);
+  }
   doubtful = zero;
   for (std::size_t word = 0; word < std::size(outline_.on_row[0]); ++word) {
     for (std::uint64_t edges = outline_.on_row[line % rows_.rows][word]; edges != 0; edges &= edges - 1) {
@@ -1059,11 +1104,7 @@ HWY_INLINE UintVec PacketSolver::WindLine(std::uint32_t line, UintVec& doubtful)
           hn::IfThenElseZero(hn::Lt(first, hn::Set(du, 32u)), hn::Shl(ones, hn::And(first, hn::Set(du, 31u))));
 #endif
       LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
-      if (e >= outline_.fixed) {
-        const LaneMask positive = LanesFromBits(outline_.positive[e], 0), negative = LanesFromBits(outline_.negative[e], 0);
-        const LaneMask turned_down = hn::Or(hn::And(down, positive), hn::And(up, negative));
-        up = hn::Or(hn::And(up, positive), hn::And(down, negative)), down = turned_down;
-      }
+      if (e >= outline_.fixed) Turn(e, down, up);
       if (!hn::AllFalse(d, down)) winding.Add(hn::IfThenElseZero(hn::RebindMask(du, down), beyond));
       if (!hn::AllFalse(d, up)) winding.Subtract(hn::IfThenElseZero(hn::RebindMask(du, up), beyond));
     }
@@ -1131,8 +1172,7 @@ bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupVie
     const UintVec open = hn::Load(du, packet_.open[line]);
     UintVec doubtful;
     ++counters_.sample_tests;
-    UintVec blocked =
-        hn::And(outline_.crossings > 15 ? WindLine<8>(line, doubtful) : WindLine<4>(line, doubtful), open);
+    UintVec blocked = hn::And(WindLine(line, doubtful), open);
     doubtful = hn::And(doubtful, open);
     if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
       alignas(HWY_MAX_BYTES) std::uint32_t in_doubt[kMaxLanes], does[kMaxLanes];
