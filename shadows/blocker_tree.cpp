@@ -126,13 +126,14 @@ std::vector<const Branch*> widen(const Branch& branch) {
 std::uint32_t flatten_group(const Branch& branch, BlockerTree& tree) {
   const auto index = static_cast<std::uint32_t>(tree.nodes.size());
   BlockerTree::Node& node = tree.nodes.emplace_back();
+  node.is_group = true;
   for (const Branch* child : widen(branch)) {
     node.child[node.count++] = static_cast<std::uint32_t>(tree.leaves.size()) | BlockerTree::kLeafBit;
     BlockerTree::Leaf& leaf = tree.leaves.emplace_back();
     leaf.first = static_cast<std::uint32_t>(child->begin);
     leaf.count = static_cast<std::uint32_t>(child->end - child->begin);
   }
-  return index | BlockerTree::kGroupBit;
+  return index;
 }
 
 /// A node for a branch that is no group, or the root.
@@ -250,8 +251,7 @@ void trace_groups(BlockerTree& tree) {
   std::vector<GroupOutline> groups(tree.nodes.size());
   parallel_ranges(tree.nodes.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n != end; ++n) {
-      if (tree.nodes[n].count > 0 && (tree.nodes[n].child[0] & BlockerTree::kLeafBit) != 0)
-        trace_group(tree, tree.nodes[n], groups[n]);
+      if (tree.nodes[n].is_group) trace_group(tree, tree.nodes[n], groups[n]);
     }
   });
   tree.edges.clear(), tree.vertices.clear();
@@ -360,8 +360,7 @@ void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, c
       Bounds box;  // empty for unused children: no shaft meets it
       if (i < node.count) {
         const std::uint32_t child = node.child[i];
-        box = child & BlockerTree::kLeafBit ? leaf_box[child & ~BlockerTree::kLeafBit]
-                                            : node_box[child & ~BlockerTree::kGroupBit];
+        box = child & BlockerTree::kLeafBit ? leaf_box[child & ~BlockerTree::kLeafBit] : node_box[child];
         node_box[n].add(box);
       }
       for (int axis = 0; axis < 3; ++axis) node.low[axis][i] = box.low[axis], node.high[axis][i] = box.high[axis];

@@ -20,16 +20,19 @@ struct LightFrame {
 
 struct BlockerTree {
   static constexpr std::uint32_t kWidth = 16;
-  static constexpr std::uint32_t kLeafBit = 0x80000000u, kGroupBit = 0x40000000u;
+  static constexpr std::uint32_t kLeafBit = 0x80000000u;
   static constexpr std::uint32_t kGroupSlots = kWidth * kWidth;
 
   /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit. The lowest nodes are
-  /// groups: their children are leaves, one after another, and references to them have kGroupBit. The root is no group.
+  /// groups: their children are leaves, one after another. The root is no group.
   struct alignas(64) Node {
     float low[3][kWidth], high[3][kWidth];
     std::uint32_t child[kWidth];
     std::uint32_t count = 0;
+    bool is_group = false;
     std::uint32_t first_edge = 0, edges = 0, first_vertex = 0, vertices = 0;  // of a group; runs of the arrays below
+
+    std::uint32_t first_leaf() const { return child[0] & ~kLeafBit; }  // of a group
   };
   /// Edge of a group between two of its vertices. `left` is the triangle that runs along it, `right` the one that runs
   /// against it, as 16 x child + lane; kGroupSlots where there is none. A third triangle takes an edge of its own.

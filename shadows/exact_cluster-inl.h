@@ -72,7 +72,6 @@ HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const 
 /// Leaves or, where `kGroups`, groups (nodes) whose box meets the cluster's shaft, into scratch.leaf.
 template <bool kGroups>
 HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, ExactScratch& scratch) {
-  constexpr std::uint32_t kListed = kGroups ? BlockerTree::kGroupBit : BlockerTree::kLeafBit;
   const std::size_t lanes = hn::Lanes(Tag());
   scratch.leaf.clear();
   for (int k = 0; k < 3; ++k) scratch.low[k].clear(), scratch.high[k].clear();
@@ -86,8 +85,9 @@ HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, Exact
       for (std::uint64_t bits = Bits(MeetsShaft(shaft, low, high, i)); bits != 0; bits &= bits - 1) {
         const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
         if (at >= node.count) continue;
-        const std::uint32_t child = node.child[at] & ~(BlockerTree::kLeafBit | BlockerTree::kGroupBit);
-        if ((node.child[at] & kListed) == 0) {
+        const std::uint32_t child = node.child[at] & ~BlockerTree::kLeafBit;
+        const bool is_leaf = child != node.child[at];
+        if (!is_leaf && !(kGroups && tree.nodes[child].is_group)) {
           scratch.stack.push_back(child);
           continue;
         }
