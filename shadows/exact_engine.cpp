@@ -144,7 +144,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   stats.cull_ms += watch.lap();
   const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
   const auto solve = rows.empty() ? solve_cluster : solve_packets;
-  constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 512;
+  constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   work.scratches.start(concurrency());
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
