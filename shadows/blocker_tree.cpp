@@ -26,8 +26,10 @@ struct Item {
 /// Binary tree before it is widened; a leaf has no children.
 struct Branch {
   Bounds bounds;
-  std::size_t begin = 0, end = 0;
+  std::size_t begin = 0, end = 0, leaves = 1;
   std::unique_ptr<Branch> left, right;
+
+  bool is_group() const { return leaves <= kWidth; }
 };
 
 struct Split {
@@ -99,16 +101,19 @@ std::unique_ptr<Branch> build(std::span<Item> items, std::size_t begin) {
     left();
     right();
   }
+  branch->leaves = branch->left->leaves + branch->right->leaves;
   return branch;
 }
 
-/// Children of a wide node: the widest branches are opened until there are 16, or all are leaves.
+/// Children of a wide node: the widest branches are opened until there are 16, or all are groups; a group's are its
+/// leaves.
 std::vector<const Branch*> widen(const Branch& branch) {
   std::vector<const Branch*> children = {&branch};
   while (children.size() < kWidth) {
     const Branch** widest = nullptr;
     for (const Branch*& child : children) {
-      if (child->left && (widest == nullptr || child->bounds.area() > (*widest)->bounds.area())) widest = &child;
+      if (!child->left || (child->is_group() && !branch.is_group())) continue;
+      if (widest == nullptr || child->bounds.area() > (*widest)->bounds.area()) widest = &child;
     }
     if (widest == nullptr) break;
     const Branch* opened = *widest;
@@ -118,24 +123,29 @@ std::vector<const Branch*> widen(const Branch& branch) {
   return children;
 }
 
+std::uint32_t flatten_group(const Branch& branch, BlockerTree& tree) {
+  const auto index = static_cast<std::uint32_t>(tree.nodes.size());
+  BlockerTree::Node& node = tree.nodes.emplace_back();
+  node.is_group = true;
+  for (const Branch* child : widen(branch)) {
+    node.child[node.count++] = static_cast<std::uint32_t>(tree.leaves.size()) | BlockerTree::kLeafBit;
+    BlockerTree::Leaf& leaf = tree.leaves.emplace_back();
+    leaf.first = static_cast<std::uint32_t>(child->begin);
+    leaf.count = static_cast<std::uint32_t>(child->end - child->begin);
+  }
+  return index;
+}
+
+/// A node for a branch that is no group, or the root.
 std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   const auto index = static_cast<std::uint32_t>(tree.nodes.size());
   tree.nodes.emplace_back();
   check_run();
-  const std::vector<const Branch*> children = widen(branch);
+  const std::vector<const Branch*> children = branch.is_group() ? std::vector{&branch} : widen(branch);
   tree.nodes[index].count = static_cast<std::uint32_t>(children.size());
   for (std::uint32_t i = 0; i < children.size(); ++i) {
-    const Branch& child = *children[i];
-    std::uint32_t reference = 0;
-    if (child.left) {
-      reference = flatten(child, tree);
-    } else {
-      reference = static_cast<std::uint32_t>(tree.leaves.size()) | BlockerTree::kLeafBit;
-      BlockerTree::Leaf& leaf = tree.leaves.emplace_back();
-      leaf.first = static_cast<std::uint32_t>(child.begin);
-      leaf.count = static_cast<std::uint32_t>(child.end - child.begin);
-    }
-    tree.nodes[index].child[i] = reference;
+    const std::uint32_t child = children[i]->is_group() ? flatten_group(*children[i], tree) : flatten(*children[i], tree);
+    tree.nodes[index].child[i] = child;
   }
   return index;
 }
@@ -154,28 +164,106 @@ void set_lane(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t lan
   leaf.triangle[lane] = triangle;
 }
 
-void set_edges(std::uint32_t lane, BlockerTree::Leaf& leaf, std::uint32_t& edges) {
-  for (int k = 0; k < 3; ++k) {
-    const std::uint8_t a = leaf.corner_vertex[k][lane], b = leaf.corner_vertex[(k + 1) % 3][lane];
-    std::uint32_t e = 0;
-    const auto is = [&](std::uint8_t from, std::uint8_t to) {
-      return leaf.edge_vertex[0][e] == from && leaf.edge_vertex[1][e] == to;
-    };
-    while (e < edges && !is(a, b) && !is(b, a)) ++e;
-    if (e == edges) leaf.edge_vertex[0][e] = a, leaf.edge_vertex[1][e] = b, ++edges;
-    leaf.corner_edge[k][lane] = static_cast<std::uint8_t>(e | (is(a, b) ? 0 : BlockerTree::kReversed));
-  }
-}
-
-void fill_lanes(const LatticeMesh& mesh, const BlockerTree& tree, BlockerTree::Leaf& leaf) {
-  std::uint32_t vertices = 0, edges = 0;
+void fill_lanes(const LatticeMesh& mesh, BlockerTree& tree, std::uint32_t index) {
+  BlockerTree::Leaf& leaf = tree.leaves[index];
+  std::uint32_t vertices = 0;
   leaf.perforated = 0;
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     set_lane(mesh, tree.order[leaf.first + std::min(lane, leaf.count - 1)], lane, leaf, vertices);
-    set_edges(lane, leaf, edges);
-    leaf.perforated |= std::uint32_t{lane < leaf.count && mesh.alpha_map(leaf.triangle[lane]) != kNone} << lane;
+    if (lane >= leaf.count) continue;
+    tree.place[leaf.triangle[lane]] = kWidth * index + lane;
+    leaf.perforated |= std::uint32_t{mesh.alpha_map(leaf.triangle[lane]) != kNone} << lane;
   }
   leaf.vertices = vertices;
+}
+
+/// Finds equal keys again; for as many as a group may have corners.
+template <class Key>
+class SmallMap {
+ public:
+  static constexpr std::uint32_t kSlots = 2048;
+  SmallMap() { slots_.fill(kNone); }
+
+  /// The number that equal keys got, else `next`.
+  template <class KeyOf>
+  std::uint32_t& find(const Key& key, std::uint64_t hash, const KeyOf& key_of) {
+    std::uint32_t at = static_cast<std::uint32_t>((hash * 0x9e3779b97f4a7c15u) >> 53);
+    while (slots_[at] != kNone && !(key_of(slots_[at]) == key)) at = (at + 1) % kSlots;
+    return slots_[at];
+  }
+
+ private:
+  std::array<std::uint32_t, kSlots> slots_;
+};
+
+/// Vertices and edges of a group's triangles, from the leaves.
+struct GroupOutline {
+  std::vector<vec3> vertices;
+  std::vector<BlockerTree::Edge> edges;
+};
+
+std::uint64_t hash_of(const vec3& p) {
+  const auto x = std::bit_cast<std::uint32_t>(p.x), y = std::bit_cast<std::uint32_t>(p.y),
+             z = std::bit_cast<std::uint32_t>(p.z);
+  return (std::uint64_t{x} << 32 | y) ^ std::uint64_t{z} * 0xff51afd7ed558ccdu;
+}
+
+void trace_group(const BlockerTree& tree, const BlockerTree::Node& node, GroupOutline& group) {
+  constexpr auto kNobody = static_cast<std::uint16_t>(BlockerTree::kGroupSlots);
+  group.vertices.clear(), group.edges.clear();
+  SmallMap<vec3> vertex_map;
+  SmallMap<std::uint32_t> edge_map;
+  for (std::uint32_t k = 0; k < node.count; ++k) {
+    const BlockerTree::Leaf& leaf = tree.leaves[node.child[k] & ~BlockerTree::kLeafBit];
+    std::array<std::uint16_t, 3 * kWidth> number;  // of the leaf's vertices in the group
+    for (std::uint32_t v = 0; v < leaf.vertices; ++v) {
+      const vec3 p{leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]};
+      std::uint32_t& found = vertex_map.find(p, hash_of(p), [&](std::uint32_t i) { return group.vertices[i]; });
+      if (found == kNone) found = static_cast<std::uint32_t>(group.vertices.size()), group.vertices.push_back(p);
+      number[v] = static_cast<std::uint16_t>(found);
+    }
+    for (std::uint32_t lane = 0; lane < leaf.count; ++lane) {
+      const auto triangle = static_cast<std::uint16_t>(kWidth * k + lane);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::uint16_t a = number[leaf.corner_vertex[c][lane]], b = number[leaf.corner_vertex[(c + 1) % 3][lane]];
+        if (a == b) continue;
+        const std::uint16_t from = std::min(a, b), to = std::max(a, b);
+        const std::uint32_t key = std::uint32_t{from} << 16 | to;
+        std::uint32_t& found = edge_map.find(key, key, [&](std::uint32_t i) {
+          return std::uint32_t{group.edges[i].from} << 16 | group.edges[i].to;
+        });
+        if (found != kNone) {
+          std::uint16_t& side = a == from ? group.edges[found].left : group.edges[found].right;
+          if (side == kNobody) {
+            side = triangle;
+            continue;
+          }
+        }
+        found = static_cast<std::uint32_t>(group.edges.size());
+        group.edges.push_back({from, to, a == from ? triangle : kNobody, a == from ? kNobody : triangle});
+      }
+    }
+  }
+}
+
+/// Edges and vertices of all groups, one after another.
+void trace_groups(BlockerTree& tree) {
+  std::vector<GroupOutline> groups(tree.nodes.size());
+  parallel_ranges(tree.nodes.size(), 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n != end; ++n) {
+      if (tree.nodes[n].is_group) trace_group(tree, tree.nodes[n], groups[n]);
+    }
+  });
+  tree.edges.clear(), tree.vertices.clear();
+  for (std::size_t n = 0; n < groups.size(); ++n) {
+    BlockerTree::Node& node = tree.nodes[n];
+    node.first_edge = static_cast<std::uint32_t>(tree.edges.size());
+    node.edges = static_cast<std::uint32_t>(groups[n].edges.size());
+    node.first_vertex = static_cast<std::uint32_t>(tree.vertices.size());
+    node.vertices = static_cast<std::uint32_t>(groups[n].vertices.size());
+    tree.edges.insert(tree.edges.end(), groups[n].edges.begin(), groups[n].edges.end());
+    tree.vertices.insert(tree.vertices.end(), groups[n].vertices.begin(), groups[n].vertices.end());
+  }
 }
 
 void fill_leaf(const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
@@ -213,7 +301,8 @@ Bounds leaf_bounds(const LightFrame& frame, const BlockerTree::Leaf& leaf) {
 }  // namespace
 
 std::size_t BlockerTree::bytes() const {
-  return order.size() * sizeof(order[0]) + leaves.size() * sizeof(Leaf) + nodes.size() * sizeof(Node) +
+  return (order.size() + place.size()) * sizeof(order[0]) + leaves.size() * sizeof(Leaf) + nodes.size() * sizeof(Node) +
+         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) +
          blockers.size() * sizeof(Blocker) + alpha.size() * sizeof(AlphaTriangle);
 }
 
@@ -235,9 +324,11 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
 }
 
 void place_blockers(const LatticeMesh& mesh, BlockerTree& tree) {
+  tree.place.resize(tree.order.size());
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i != end; ++i) fill_lanes(mesh, tree, tree.leaves[i]);
+    for (std::size_t i = begin; i != end; ++i) fill_lanes(mesh, tree, static_cast<std::uint32_t>(i));
   });
+  trace_groups(tree);
 }
 
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,

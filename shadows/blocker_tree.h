@@ -21,22 +21,29 @@ struct LightFrame {
 struct BlockerTree {
   static constexpr std::uint32_t kWidth = 16;
   static constexpr std::uint32_t kLeafBit = 0x80000000u;
-  static constexpr std::uint8_t kReversed = 0x80;
+  static constexpr std::uint32_t kGroupSlots = kWidth * kWidth;
 
-  /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit.
+  /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit. The lowest nodes are
+  /// groups: their children are leaves, one after another. The root is no group.
   struct alignas(64) Node {
     float low[3][kWidth], high[3][kWidth];
     std::uint32_t child[kWidth];
     std::uint32_t count = 0;
+    bool is_group = false;
+    std::uint32_t first_edge = 0, edges = 0, first_vertex = 0, vertices = 0;  // of a group; runs of the arrays below
+
+    std::uint32_t first_leaf() const { return child[0] & ~kLeafBit; }  // of a group
+  };
+  /// Edge of a group between two of its vertices. `left` is the triangle that runs along it, `right` the one that runs
+  /// against it, as 16 x child + lane; kGroupSlots where there is none. A third triangle takes an edge of its own.
+  struct Edge {
+    std::uint16_t from, to, left, right;
   };
   /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
   struct alignas(64) Leaf {
     float corner[3][3][kWidth];               // [corner][axis][lane]
     float vertex[3][3 * kWidth];              // [axis][vertex]: the corners again, equal ones once
     std::uint8_t corner_vertex[3][kWidth];    // [corner][lane] -> vertex
-    std::uint8_t edge_vertex[2][3 * kWidth];  // [end][edge] -> vertex; edges between equal vertices once
-    std::uint8_t corner_edge[3][kWidth];      // [corner][lane] -> edge from there to the next; kReversed where it runs
-                                              // against the edge's own direction
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
@@ -47,6 +54,9 @@ struct BlockerTree {
   std::vector<std::uint32_t> order;  // triangles, leaf by leaf
   std::vector<Leaf> leaves;
   std::vector<Node> nodes;           // children behind their parents; the root is the first; empty without triangles
+  std::vector<Edge> edges;           // of the groups, one after another
+  std::vector<vec3> vertices;        // the same; equal ones of a group once
+  std::vector<std::uint32_t> place;  // [triangle] 16 x leaf + lane
   std::vector<Blocker> blockers;     // [place in order], for the light of the last refit
   std::vector<AlphaTriangle> alpha;  // of the perforated ones
 

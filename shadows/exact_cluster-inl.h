@@ -69,7 +69,8 @@ HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const 
   return meets;
 }
 
-/// Leaves whose box meets the cluster's shaft, into scratch.leaf.
+/// Leaves or, where `kGroups`, groups (nodes) whose box meets the cluster's shaft, into scratch.leaf.
+template <bool kGroups>
 HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, ExactScratch& scratch) {
   const std::size_t lanes = hn::Lanes(Tag());
   scratch.leaf.clear();
@@ -84,11 +85,13 @@ HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, Exact
       for (std::uint64_t bits = Bits(MeetsShaft(shaft, low, high, i)); bits != 0; bits &= bits - 1) {
         const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
         if (at >= node.count) continue;
-        if ((node.child[at] & BlockerTree::kLeafBit) == 0) {
-          scratch.stack.push_back(node.child[at]);
+        const std::uint32_t child = node.child[at] & ~BlockerTree::kLeafBit;
+        const bool is_leaf = child != node.child[at];
+        if (!is_leaf && !(kGroups && tree.nodes[child].is_group)) {
+          scratch.stack.push_back(child);
           continue;
         }
-        scratch.leaf.push_back(node.child[at] & ~BlockerTree::kLeafBit);
+        scratch.leaf.push_back(child);
         for (int k = 0; k < 3; ++k) {
           scratch.low[k].push_back(node.low[k][at]);
           scratch.high[k].push_back(node.high[k][at]);
@@ -219,8 +222,9 @@ HWY_INLINE ProjectedLanes ProjectTriangles(const LightFrame& frame, const std::a
   return p;
 }
 
-/// Leaves that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
+/// Leaves (groups) that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
 /// the receivers are lit.
+template <bool kGroups>
 HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size_t end,
                            const KernelReceivers& receivers, ExactScratch& scratch) {
   Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};
@@ -232,7 +236,7 @@ HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size
   const vec2 low = scene.rectangles->whole_low, high = scene.rectangles->whole_high;
   const float pad = ProjectionPad(shaft.low[2]);
   shaft.light = {low.x - pad, low.y - pad, high.x + pad, high.y + pad};
-  CollectLeaves(*scene.tree, shaft, scratch);
+  CollectLeaves<kGroups>(*scene.tree, shaft, scratch);
   scratch.leaves_listed += scratch.leaf.size();
   if (scratch.leaf.empty()) {
     ++scratch.clusters_lit;

@@ -90,35 +90,13 @@ SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame&
   return r;
 }
 
-/// The lists of all scratches may become as long as the longest that any had: which cluster meets which scratch changes
-/// with the receivers.
-void even_out(std::vector<ExactScratch>& scratches) {
-  std::size_t leaves = 0, nodes = 0;
-  for (const ExactScratch& s : scratches) {
-    leaves = std::max({leaves, s.leaf.capacity(), s.low[0].capacity(), s.keys.capacity()});
-    nodes = std::max(nodes, s.stack.capacity());
-  }
-  for (ExactScratch& s : scratches) {
-    s.stack.reserve(nodes), s.leaf.reserve(leaves), s.keys.reserve(leaves);
-    s.old_leaf.reserve(leaves), s.old_bound.reserve(leaves);
-    for (int k = 0; k < 3; ++k) s.low[k].reserve(leaves), s.high[k].reserve(leaves);
-  }
-}
-
-/// Nothing is left of the light of an earlier call but memory.
-void start_anew(ExactScratch& scratch) {
-  scratch.lines.placed = PictureLines::kNothing;
-  scratch.counters = {};
-  scratch.leaves_listed = scratch.leaves_tested = scratch.clusters_lit = 0;
-}
-
-void add_counters(const std::vector<ExactScratch>& scratches, ShadowStats& stats) {
+void add_counters(const ScratchPool& scratches, ShadowStats& stats) {
   KernelCounters total;
-  for (const ExactScratch& s : scratches) {
-    total.add(s.counters);
-    stats.leaves_listed += s.leaves_listed;
-    stats.leaves_tested += s.leaves_tested;
-    stats.clusters_lit += s.clusters_lit;
+  for (const auto& s : scratches.all()) {
+    total.add(s->counters);
+    stats.leaves_listed += s->leaves_listed;
+    stats.leaves_tested += s->leaves_tested;
+    stats.clusters_lit += s->clusters_lit;
   }
   add_to_stats(total, stats);
 }
@@ -136,6 +114,20 @@ void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, const
   side.usable = samples.closed_usable;
   side.fitted = true;
 }
+
+/// A scratch for as long as this lives.
+class ScratchLoan {
+ public:
+  explicit ScratchLoan(ScratchPool& pool) : pool_(pool), scratch_(pool.take()) {}
+  ~ScratchLoan() { pool_.give(scratch_); }
+  ScratchLoan(const ScratchLoan&) = delete;
+  ScratchLoan& operator=(const ScratchLoan&) = delete;
+  ExactScratch& operator*() const { return scratch_; }
+
+ private:
+  ScratchPool& pool_;
+  ExactScratch& scratch_;
+};
 
 /// All receivers on one side of the light.
 void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, const LightFrame& frame,
@@ -163,22 +155,20 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
-  std::vector<ExactScratch>& scratches = work.scratches;
-  scratches.resize(kTasksPerRound);
-  even_out(scratches);
-  for (ExactScratch& scratch : scratches) start_anew(scratch);
+  work.scratches.start(concurrency());
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
+      const ScratchLoan scratch(work.scratches);
       const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
       for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
         check_run();
-        solve(scene, begin, std::min(task_end, begin + kCluster), kernel, scratches[t]);
+        solve(scene, begin, std::min(task_end, begin + kCluster), kernel, *scratch);
       }
     });
   }
   if (rows.empty()) scatter_masks(kernel, samples, order, masks);
-  add_counters(scratches, stats);
+  add_counters(work.scratches, stats);
   stats.bytes =
       std::max<std::uint64_t>(stats.bytes, side.tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
   stats.test_ms += watch.lap();
@@ -205,6 +195,47 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 }
 
 }  // namespace
+
+void ScratchPool::start(std::size_t threads) {
+  while (scratches_.size() < threads) scratches_.push_back(std::make_unique<ExactScratch>());
+  std::size_t leaves = 0, nodes = 0, groups = 0, edges = 0, facing = 0;
+  for (const auto& s : scratches_) {
+    groups = std::max(groups, s->groups.size());
+    facing = std::max(facing, s->facing.capacity());
+    edges = std::max(edges, s->net_edges.vertex[0].size());
+    leaves = std::max({leaves, s->leaf.capacity(), s->low[0].capacity(), s->keys.capacity()});
+    nodes = std::max(nodes, s->stack.capacity());
+  }
+  free_.clear();
+  for (const auto& s : scratches_) {
+    s->stack.reserve(nodes), s->leaf.reserve(leaves), s->keys.reserve(leaves);
+    s->groups.resize(groups), s->own_places.reserve(kCluster), s->net_edges.reserve(edges);
+    s->facing.reserve(facing);
+    s->old_leaf.reserve(leaves), s->old_bound.reserve(leaves);
+    for (int k = 0; k < 3; ++k) s->low[k].reserve(leaves), s->high[k].reserve(leaves);
+    s->lines.placed = PictureLines::kNothing;
+    s->counters = {};
+    s->leaves_listed = s->leaves_tested = s->clusters_lit = 0;
+    free_.push_back(s.get());
+  }
+}
+
+ExactScratch& ScratchPool::take() {
+  const std::lock_guard lock(mutex_);
+  if (free_.empty()) {  // more threads than we were told
+    scratches_.push_back(std::make_unique<ExactScratch>());
+    free_.reserve(scratches_.size());
+    return *scratches_.back();
+  }
+  ExactScratch& scratch = *free_.back();
+  free_.pop_back();
+  return scratch;
+}
+
+void ScratchPool::give(ExactScratch& scratch) {
+  const std::lock_guard lock(mutex_);
+  free_.push_back(&scratch);
+}
 
 void ExactWork::reserve(std::size_t count, std::size_t words) {
   const std::size_t padded = count + KernelReceivers::kLanePadding;

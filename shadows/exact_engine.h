@@ -6,6 +6,9 @@
 // light that nothing has blocked yet, and stops when there is none.
 #pragma once
 
+#include <memory>
+#include <mutex>
+
 #include "shadows/closed_components.h"
 #include "shadows/exact_kernel.h"
 #include "shadows/light_view.h"
@@ -47,12 +50,28 @@ struct ExactLight {
   }
 };
 
+/// One for each thread at work, kept from call to call.
+class ScratchPool {
+ public:
+  /// Room for so many threads; nothing is left of earlier calls but memory, the same for all: which cluster meets which
+  /// scratch changes from call to call.
+  void start(std::size_t threads);
+  ExactScratch& take();
+  void give(ExactScratch& scratch);
+  const std::vector<std::unique_ptr<ExactScratch>>& all() const { return scratches_; }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<ExactScratch>> scratches_;
+  std::vector<ExactScratch*> free_;
+};
+
 /// Scratch of a call.
 struct ExactWork {
   MortonScratch morton;
   std::vector<std::uint32_t> order;
   KernelReceivers receivers;
-  std::vector<ExactScratch> scratches;
+  ScratchPool scratches;
 
   /// Room for so many receivers with masks of so many words.
   void reserve(std::size_t count, std::size_t words);

@@ -242,7 +242,7 @@ HWY_INLINE void SolveReceiver(const ExactScene& scene, std::size_t index, Kernel
 
 void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                   ExactScratch& scratch) {
-  if (!ListLeaves(scene, begin, end, receivers, scratch)) return;
+  if (!ListLeaves<false>(scene, begin, end, receivers, scratch)) return;
   for (std::size_t i = begin; i < end; ++i) SolveReceiver(scene, i, receivers, scratch);
 }
 

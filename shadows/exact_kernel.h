@@ -39,6 +39,33 @@ struct PictureLines {
   void place(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
 };
 
+/// What a cluster of receivers sees of a group (packet_kernel.cpp).
+struct GroupView {
+  bool known = false;                              // looked at
+  std::uint32_t first = 0, fixed = 0, turning = 0;  // runs of ExactScratch::net_edges: `fixed` edges, then `turning` ones
+  // Triangles of each leaf, as bits: those that are seen from one side; plain ones that may be seen from either; others.
+  std::uint16_t patch[BlockerTree::kWidth], turns[BlockerTree::kWidth], single[BlockerTree::kWidth];
+  std::uint32_t facing = 0;  // place in ExactScratch::facing, where edges turn
+};
+
+/// Edges of patches that do not cancel: numbers of their vertices in the group, these themselves, and for edges of
+/// triangles that turn BlockerTree::Edge::left and right.
+struct NetEdges {
+  std::size_t count = 0;
+  std::vector<std::uint16_t> vertex[2], triangle[2];
+  std::vector<float> end[2][3];
+
+  /// Room for so many edges; contents stay.
+  void reserve(std::size_t edges) {
+    if (vertex[0].size() >= edges) return;
+    edges = std::max(edges, 2 * vertex[0].size());
+    for (auto* numbers : {vertex, triangle}) numbers[0].resize(edges), numbers[1].resize(edges);
+    for (auto& ends : end) {
+      for (auto& axis : ends) axis.resize(edges);
+    }
+  }
+};
+
 /// Scratch of one thread, and what it counted.
 struct ExactScratch {
   PictureLines lines;
@@ -47,6 +74,12 @@ struct ExactScratch {
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
   std::vector<std::uint32_t> old_leaf;                // what is being sorted
   std::vector<float> old_bound;
+  std::vector<GroupView> groups;              // of the groups listed in `leaf`
+  std::vector<std::uint32_t> own_places;      // BlockerTree::place of the receivers' own triangles
+  NetEdges net_edges;
+  // [triangle, kGroupSlots for none] of a group: receivers of the packet at work that see it from below, so that its
+  // outline is positive; then the same from above. As bits; all or none where a triangle does not turn.
+  std::vector<std::uint16_t> facing;
   KernelCounters counters;
   std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0;
 };
