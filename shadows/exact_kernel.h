@@ -55,14 +55,14 @@ struct NetEdges {
   std::vector<std::uint16_t> vertex[2], triangle[2];
   std::vector<float> end[2][3];
 
-  /// Room for so many edges; contents stay.
+  /// Room for so many edges; contents stay. Where memory runs out, the next call tries again: vertex[0] grows last.
   void reserve(std::size_t edges) {
     if (vertex[0].size() >= edges) return;
-    edges = std::max(edges, 2 * vertex[0].size());
-    for (auto* numbers : {vertex, triangle}) numbers[0].resize(edges), numbers[1].resize(edges);
     for (auto& ends : end) {
       for (auto& axis : ends) axis.resize(edges);
     }
+    triangle[0].resize(edges), triangle[1].resize(edges);
+    vertex[1].resize(edges), vertex[0].resize(edges);
   }
 };
 

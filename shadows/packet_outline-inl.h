@@ -109,7 +109,8 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
   turns[BlockerTree::kGroupSlots] = 0;
   NetEdges& net = scratch.net_edges;
   view.first = static_cast<std::uint32_t>(net.count);
-  net.reserve(net.count + 2 * group.edges + kMaxLanes);
+  const std::size_t wanted = net.count + 2 * group.edges + kMaxLanes;
+  if (net.vertex[0].size() < wanted) net.reserve(2 * wanted);
   const vec3* const vertices = tree.vertices.data() + group.first_vertex;
   const auto add = [&](const BlockerTree::Edge& edge, std::uint16_t a, std::uint16_t b) {
     const std::size_t at = net.count++;
