@@ -144,7 +144,8 @@ std::uint32_t flatten(const Branch& branch, BlockerTree& tree) {
   const std::vector<const Branch*> children = branch.is_group() ? std::vector{&branch} : widen(branch);
   tree.nodes[index].count = static_cast<std::uint32_t>(children.size());
   for (std::uint32_t i = 0; i < children.size(); ++i) {
-    const std::uint32_t child = children[i]->is_group() ? flatten_group(*children[i], tree) : flatten(*children[i], tree);
+    const std::uint32_t child =
+        children[i]->is_group() ? flatten_group(*children[i], tree) : flatten(*children[i], tree);
     tree.nodes[index].child[i] = child;
   }
   return index;
@@ -196,10 +197,12 @@ class SmallMap {
   std::array<std::uint32_t, kSlots> slots_;
 };
 
-/// Vertices and edges of a group's triangles, from the leaves.
-struct GroupOutline {
-  std::vector<vec3> vertices;
-  std::vector<BlockerTree::Edge> edges;
+/// Vertices and edges of a group's triangles.
+struct GroupMesh {
+  static constexpr std::size_t kMost = 3 * BlockerTree::kGroupSlots;
+  std::array<vec3, kMost> vertex;
+  std::array<BlockerTree::Edge, kMost> edge;
+  std::uint32_t vertices = 0, edges = 0;
 };
 
 std::uint64_t hash_of(const vec3& p) {
@@ -208,9 +211,9 @@ std::uint64_t hash_of(const vec3& p) {
   return (std::uint64_t{x} << 32 | y) ^ std::uint64_t{z} * 0xff51afd7ed558ccdu;
 }
 
-void trace_group(const BlockerTree& tree, const BlockerTree::Node& node, GroupOutline& group) {
+void trace_group(const BlockerTree& tree, const BlockerTree::Node& node, GroupMesh& group) {
   constexpr auto kNobody = static_cast<std::uint16_t>(BlockerTree::kGroupSlots);
-  group.vertices.clear(), group.edges.clear();
+  group.vertices = group.edges = 0;
   SmallMap<vec3> vertex_map;
   SmallMap<std::uint32_t> edge_map;
   for (std::uint32_t k = 0; k < node.count; ++k) {
@@ -218,8 +221,8 @@ void trace_group(const BlockerTree& tree, const BlockerTree::Node& node, GroupOu
     std::array<std::uint16_t, 3 * kWidth> number;  // of the leaf's vertices in the group
     for (std::uint32_t v = 0; v < leaf.vertices; ++v) {
       const vec3 p{leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]};
-      std::uint32_t& found = vertex_map.find(p, hash_of(p), [&](std::uint32_t i) { return group.vertices[i]; });
-      if (found == kNone) found = static_cast<std::uint32_t>(group.vertices.size()), group.vertices.push_back(p);
+      std::uint32_t& found = vertex_map.find(p, hash_of(p), [&](std::uint32_t i) { return group.vertex[i]; });
+      if (found == kNone) found = group.vertices, group.vertex[group.vertices++] = p;
       number[v] = static_cast<std::uint16_t>(found);
     }
     for (std::uint32_t lane = 0; lane < leaf.count; ++lane) {
@@ -229,41 +232,48 @@ void trace_group(const BlockerTree& tree, const BlockerTree::Node& node, GroupOu
         if (a == b) continue;
         const std::uint16_t from = std::min(a, b), to = std::max(a, b);
         const std::uint32_t key = std::uint32_t{from} << 16 | to;
-        std::uint32_t& found = edge_map.find(key, key, [&](std::uint32_t i) {
-          return std::uint32_t{group.edges[i].from} << 16 | group.edges[i].to;
-        });
+        std::uint32_t& found = edge_map.find(
+            key, key, [&](std::uint32_t i) { return std::uint32_t{group.edge[i].from} << 16 | group.edge[i].to; });
         if (found != kNone) {
-          std::uint16_t& side = a == from ? group.edges[found].left : group.edges[found].right;
+          std::uint16_t& side = a == from ? group.edge[found].left : group.edge[found].right;
           if (side == kNobody) {
             side = triangle;
             continue;
           }
         }
-        found = static_cast<std::uint32_t>(group.edges.size());
-        group.edges.push_back({from, to, a == from ? triangle : kNobody, a == from ? kNobody : triangle});
+        found = group.edges;
+        group.edge[group.edges++] = {from, to, a == from ? triangle : kNobody, a == from ? kNobody : triangle};
       }
     }
   }
 }
 
-/// Edges and vertices of all groups, one after another.
+/// Edges and vertices of all groups, one after another. Traced twice, to be counted and to be stored: so a mesh that
+/// only moved needs no more memory.
 void trace_groups(BlockerTree& tree) {
-  std::vector<GroupOutline> groups(tree.nodes.size());
-  parallel_ranges(tree.nodes.size(), 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n != end; ++n) {
-      if (tree.nodes[n].is_group) trace_group(tree, tree.nodes[n], groups[n]);
-    }
+  const auto for_groups = [&tree](const auto& visit) {
+    parallel_ranges(tree.nodes.size(), 4, [&](std::size_t begin, std::size_t end) {
+      GroupMesh group;
+      for (std::size_t n = begin; n != end; ++n) {
+        if (!tree.nodes[n].is_group) continue;
+        trace_group(tree, tree.nodes[n], group);
+        visit(tree.nodes[n], group);
+      }
+    });
+  };
+  for_groups([](BlockerTree::Node& node, const GroupMesh& group) {
+    node.edges = group.edges, node.vertices = group.vertices;
   });
-  tree.edges.clear(), tree.vertices.clear();
-  for (std::size_t n = 0; n < groups.size(); ++n) {
-    BlockerTree::Node& node = tree.nodes[n];
-    node.first_edge = static_cast<std::uint32_t>(tree.edges.size());
-    node.edges = static_cast<std::uint32_t>(groups[n].edges.size());
-    node.first_vertex = static_cast<std::uint32_t>(tree.vertices.size());
-    node.vertices = static_cast<std::uint32_t>(groups[n].vertices.size());
-    tree.edges.insert(tree.edges.end(), groups[n].edges.begin(), groups[n].edges.end());
-    tree.vertices.insert(tree.vertices.end(), groups[n].vertices.begin(), groups[n].vertices.end());
+  std::uint32_t edges = 0, vertices = 0;
+  for (BlockerTree::Node& node : tree.nodes) {
+    node.first_edge = edges, node.first_vertex = vertices;
+    edges += node.edges, vertices += node.vertices;
   }
+  tree.edges.resize(edges), tree.vertices.resize(vertices);
+  for_groups([&tree](const BlockerTree::Node& node, const GroupMesh& group) {
+    std::copy_n(group.edge.begin(), group.edges, tree.edges.begin() + node.first_edge);
+    std::copy_n(group.vertex.begin(), group.vertices, tree.vertices.begin() + node.first_vertex);
+  });
 }
 
 void fill_leaf(const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
@@ -302,8 +312,8 @@ Bounds leaf_bounds(const LightFrame& frame, const BlockerTree::Leaf& leaf) {
 
 std::size_t BlockerTree::bytes() const {
   return (order.size() + place.size()) * sizeof(order[0]) + leaves.size() * sizeof(Leaf) + nodes.size() * sizeof(Node) +
-         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) +
-         blockers.size() * sizeof(Blocker) + alpha.size() * sizeof(AlphaTriangle);
+         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) + blockers.size() * sizeof(Blocker) +
+         alpha.size() * sizeof(AlphaTriangle);
 }
 
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {

@@ -41,9 +41,9 @@ struct BlockerTree {
   };
   /// 16 triangles as arrays of lanes, lattice coordinates; bit masks say what holds for a lane.
   struct alignas(64) Leaf {
-    float corner[3][3][kWidth];               // [corner][axis][lane]
-    float vertex[3][3 * kWidth];              // [axis][vertex]: the corners again, equal ones once
-    std::uint8_t corner_vertex[3][kWidth];    // [corner][lane] -> vertex
+    float corner[3][3][kWidth];             // [corner][axis][lane]
+    float vertex[3][3 * kWidth];            // [axis][vertex]: the corners again, equal ones once
+    std::uint8_t corner_vertex[3][kWidth];  // [corner][lane] -> vertex
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order

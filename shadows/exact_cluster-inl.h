@@ -222,8 +222,8 @@ HWY_INLINE ProjectedLanes ProjectTriangles(const LightFrame& frame, const std::a
   return p;
 }
 
-/// Leaves (groups) that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
-/// the receivers are lit.
+/// Leaves (groups) that the shaft of receivers [begin, end) meets, what hides most first; false where there are none
+/// and all of the receivers are lit.
 template <bool kGroups>
 HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size_t end,
                            const KernelReceivers& receivers, ExactScratch& scratch) {

@@ -41,9 +41,11 @@ struct PictureLines {
 
 /// What a cluster of receivers sees of a group (packet_kernel.cpp).
 struct GroupView {
-  bool known = false;                              // looked at
-  std::uint32_t first = 0, fixed = 0, turning = 0;  // runs of ExactScratch::net_edges: `fixed` edges, then `turning` ones
-  // Triangles of each leaf, as bits: those that are seen from one side; plain ones that may be seen from either; others.
+  bool known = false;  // looked at
+  std::uint32_t first = 0, fixed = 0,
+                turning = 0;  // runs of ExactScratch::net_edges: `fixed` edges, then `turning` ones
+  // Triangles of each leaf, as bits: those that are seen from one side; plain ones that may be seen from either;
+  // others.
   std::uint16_t patch[BlockerTree::kWidth], turns[BlockerTree::kWidth], single[BlockerTree::kWidth];
   std::uint32_t facing = 0;  // place in ExactScratch::facing, where edges turn
 };
@@ -74,8 +76,8 @@ struct ExactScratch {
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
   std::vector<std::uint32_t> old_leaf;                // what is being sorted
   std::vector<float> old_bound;
-  std::vector<GroupView> groups;              // of the groups listed in `leaf`
-  std::vector<std::uint32_t> own_places;      // BlockerTree::place of the receivers' own triangles
+  std::vector<GroupView> groups;          // of the groups listed in `leaf`
+  std::vector<std::uint32_t> own_places;  // BlockerTree::place of the receivers' own triangles
   NetEdges net_edges;
   // [triangle, kGroupSlots for none] of a group: receivers of the packet at work that see it from below, so that its
   // outline is positive; then the same from above. As bits; all or none where a triangle does not turn.

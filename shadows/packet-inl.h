@@ -1,5 +1,5 @@
-// Packets of receivers, per instruction set: how they see boxes, triangles and vertices before the light as rectangles and
-// places of a picture of rows. Included once per Highway target by packet_kernel.cpp.
+// Packets of receivers, per instruction set: how they see boxes, triangles and vertices before the light as rectangles
+// and places of a picture of rows. Included once per Highway target by packet_kernel.cpp.
 
 #if defined(HALFSHADE_PACKET_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_PACKET_INL_H_
@@ -21,12 +21,14 @@ constexpr std::size_t kMaxLines = SampleRows::kMaxLines;
 /// Receivers as boxes.
 struct ReceiverBox {
   vec3 low{1e30f}, high{-1e30f};  // lattice
-  Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};  // the light's frame, and what of the light is asked
+  Shaft shaft{
+      {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};  // the light's frame, and what of the light is asked
 
   void add(const LightFrame& frame, const vec3& r) {
     const vec3 p(frame.to_frame(dvec3(r)));
     low = glm::min(low, r), high = glm::max(high, r);
-    for (int k = 0; k < 3; ++k) shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
+    for (int k = 0; k < 3; ++k)
+      shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
   }
 };
 
@@ -139,8 +141,8 @@ struct LeafView {
   PictureRanges ranges;
 };
 
-/// On which side of the planes a box of receivers lies, and so whether they separate it from samples. Fills above, below
-/// and active.
+/// On which side of the planes a box of receivers lies, and so whether they separate it from samples. Fills above,
+/// below and active.
 template <class View>
 HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const vec3& low, const vec3& high,
                           const vec3& half, const Vec3& to_corner, View& view) {
@@ -193,8 +195,8 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
       place_low[axis] = hn::Min(place_low[axis], place), place_high[axis] = hn::Max(place_high[axis], place);
     }
   }
-  // Triangles that reach the height of a receiver project without bounds, but only away from the receivers, and at least
-  // as far as from their lowest height.
+  // Triangles that reach the height of a receiver project without bounds, but only away from the receivers, and at
+  // least as far as from their lowest height.
   farthest = hn::Add(farthest, hn::Set(d, half[0] + half[1] + half[2]));
   const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
   const Vec magnified = hn::Div(hn::Mul(farthest, hn::Set(d, 1e-6f * (box.high[2] + 4.0f))), least);
@@ -203,10 +205,9 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
   const Vec depth = hn::Add(hn::Max(hn::Sub(hn::Set(d, box.high[2]), lowest), zero), margin);
   const Vec away_by = hn::Div(hn::Mul(hn::Max(hn::Sub(lowest, margin), zero), hn::Set(d, 0.999f)), depth);
   for (int axis = 0; axis < 2; ++axis) {
-    const Vec low =
-        hn::IfThenElse(hn::Gt(nearest[axis], margin),
-                       hn::MulAdd(hn::Sub(nearest[axis], margin), away_by, hn::Sub(place_low[axis], margin)),
-                       hn::Neg(everywhere));
+    const Vec low = hn::IfThenElse(
+        hn::Gt(nearest[axis], margin),
+        hn::MulAdd(hn::Sub(nearest[axis], margin), away_by, hn::Sub(place_low[axis], margin)), hn::Neg(everywhere));
     const Vec high =
         hn::IfThenElse(hn::Lt(last[axis], hn::Neg(margin)),
                        hn::MulAdd(hn::Add(last[axis], margin), away_by, hn::Add(place_high[axis], margin)), everywhere);
@@ -240,8 +241,8 @@ HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& 
   view.kept |= static_cast<std::uint32_t>(LanesOverOpenSamples(*scene.rows, q, active, packet, i, view.ranges)) << i;
 }
 
-/// Vertices as each receiver sees them before the light, in columns and rows; `error` bounds how far they may lie off, in
-/// lengths along either axis.
+/// Vertices as each receiver sees them before the light, in columns and rows; `error` bounds how far they may lie off,
+/// in lengths along either axis.
 struct ProjectedVertices {
   static constexpr std::size_t kMost = 255;
   alignas(HWY_MAX_BYTES) float column[kMost][kMaxLanes], row[kMost][kMaxLanes], error[kMost][kMaxLanes];

@@ -282,9 +282,9 @@ bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& vie
   std::uint16_t patch[BlockerTree::kWidth];
   FindTurns(group, view, leaves, patch);
   int in_patch = 0;
-  for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) in_patch += std::popcount(patch[std::countr_zero(rest)]);
-  const bool patched =
-      !rows_.place.empty() && in_patch >= 3 && RasterizePatch(group, view, patch, leaves, added);
+  for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1)
+    in_patch += std::popcount(patch[std::countr_zero(rest)]);
+  const bool patched = !rows_.place.empty() && in_patch >= 3 && RasterizePatch(group, view, patch, leaves, added);
   for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) {
     const auto k = static_cast<std::uint32_t>(std::countr_zero(rest));
     std::uint32_t wanted = view.patch[k] | view.turns[k] | view.single[k];
@@ -311,17 +311,17 @@ void PacketSolver::FindTurns(const BlockerTree::Node& group, GroupView& view, st
     if (view.turns[k] == 0) continue;
     const bool is_listed = (leaves >> k & 1) != 0;
     const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
-    const bool outside_box =
-        cluster_.low.x > leaf.box_high.x || cluster_.low.y > leaf.box_high.y || cluster_.low.z > leaf.box_high.z ||
-        cluster_.high.x < leaf.box_low.x || cluster_.high.y < leaf.box_low.y || cluster_.high.z < leaf.box_low.z;
+    const bool outside_box = cluster_.low.x > leaf.box_high.x || cluster_.low.y > leaf.box_high.y ||
+                             cluster_.low.z > leaf.box_high.z || cluster_.high.x < leaf.box_low.x ||
+                             cluster_.high.y < leaf.box_low.y || cluster_.high.z < leaf.box_low.z;
     const std::uint32_t samples_below = leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u);
     for (std::uint32_t rest = view.turns[k]; rest != 0; rest &= rest - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
       const std::size_t at = BlockerTree::kWidth * k + lane;
       positive[at] = negative[at] = 0;
       if (!is_listed) continue;
-      const Vec3 to_corner = Subtract(Splat({leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}),
-                                      packet_.position);
+      const Vec3 to_corner = Subtract(
+          Splat({leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}), packet_.position);
       const Vec side = Dot(Splat({leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}), to_corner),
                 error = hn::Mul(hn::Set(d, leaf.side_error[lane]), Norm1(to_corner));
       if (!hn::AllFalse(d, hn::And(everyone, hn::Le(hn::Abs(side), error)))) continue;
@@ -564,14 +564,13 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafVi
   const Tag d;
   const UintTag du;
   const PictureRange range(rows_, view.ranges, lane);
-  LaneMask active = hn::And(hn::FirstN(d, packet_.count),
-                            hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
+  LaneMask active =
+      hn::And(hn::FirstN(d, packet_.count), hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
   LineSet lines;
   if ((view.bounded >> lane) & 1) {
     const std::array<std::uint8_t, 3> corner = {leaf.corner_vertex[0][lane], leaf.corner_vertex[1][lane],
                                                 leaf.corner_vertex[2][lane]};
-    active =
-        hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[lane], vertices_, range, packet_, lines));
+    active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[lane], vertices_, range, packet_, lines));
   } else {
     range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
       lines.add(line);

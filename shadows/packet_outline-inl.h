@@ -1,6 +1,6 @@
-// Patches of triangles by their outlines, per instruction set. What a finely tessellated surface hides is what lies within
-// its outline: the edges of a group of leaves that do not cancel between two triangles that are seen alike, rasterized
-// as winding numbers into the pictures of a packet. Included once per Highway target by packet_kernel.cpp.
+// Patches of triangles by their outlines, per instruction set. What a finely tessellated surface hides is what lies
+// within its outline: the edges of a group of leaves that do not cancel between two triangles that are seen alike,
+// rasterized as winding numbers into the pictures of a packet. Included once per Highway target by packet_kernel.cpp.
 
 #if defined(HALFSHADE_PACKET_OUTLINE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_PACKET_OUTLINE_INL_H_
@@ -18,16 +18,18 @@ namespace HWY_NAMESPACE {
 /// Edges around a patch of triangles, each from a vertex to the next, as the receivers see them in columns and rows.
 struct OutlineEdges {
   static constexpr std::uint32_t kMost = 255;  // and so nothing is wound around more often than 8 bits can say
-  static constexpr float kMostError = 0.02f;  // columns or rows that vertices may lie off
-  std::uint32_t count = 0, fixed = 0;         // the first `fixed` are edges from `from` to `to` for all receivers
-  std::uint8_t from[kMost], to[kMost];        // vertices
-  std::uint16_t positive[kMost], negative[kMost];  // receivers for which others are, and for which they run against that
-  std::uint8_t first_row[kMost], last_row[kMost];  // the edge crosses no others
+  static constexpr float kMostError = 0.02f;   // columns or rows that vertices may lie off
+  std::uint32_t count = 0, fixed = 0;          // the first `fixed` are edges from `from` to `to` for all receivers
+  std::uint8_t from[kMost], to[kMost];         // vertices
+  std::uint16_t positive[kMost],
+      negative[kMost];  // receivers for which others are, and for which they run against that
+  std::uint8_t first_row[kMost], last_row[kMost];                                 // the edge crosses no others
   alignas(HWY_MAX_BYTES) float slope[kMost][kMaxLanes], width[kMost][kMaxLanes];  // columns a row; uncertainty
-  std::uint64_t on_row[SampleRows::kMaxRows][kMost / 64 + 1];  // edges that may cross the row
-  std::uint64_t left_on_row[SampleRows::kMaxRows][kMost / 64 + 1];  // the same, of edges to the left of all that is open
+  std::uint64_t on_row[SampleRows::kMaxRows][kMost / 64 + 1];                     // edges that may cross the row
+  std::uint64_t left_on_row[SampleRows::kMaxRows]
+                           [kMost / 64 + 1];  // the same, of edges to the left of all that is open
   bool left[kMost];
-  bool near_row[kMost];         // an end of the edge lies on a row for some receiver, so far as can be told
+  bool near_row[kMost];  // an end of the edge lies on a row for some receiver, so far as can be told
 };
 
 /// Triangles of one leaf of a group, as bits, as seen by a box of receivers.
@@ -64,17 +66,16 @@ HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, const BlockerTree::Leaf
     // As in ProjectOntoLight: bounded, and with a pad of at most `most`; and in front of the light's plane.
     const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
     const Vec magnified = hn::Mul(farthest, hn::Set(d, 1e-6f * (box.shaft.high[2] + 4.0f)));
-    const LaneMask good =
-        hn::Le(magnified, hn::Mul(least, hn::Set(d, most - ProjectionPad(box.shaft.low[2]))));
+    const LaneMask good = hn::Le(magnified, hn::Mul(least, hn::Set(d, most - ProjectionPad(box.shaft.low[2]))));
     const LaneMask before_light = hn::Gt(lowest, hn::Set(d, 1e-4f + scene.rectangles->thickness));
     sides.plain |= static_cast<std::uint32_t>(Bits(hn::And(hn::And(bounded, good), before_light))) << i;
   }
 }
 
 /// What the receivers of a cluster have in common about a group. Its patch are the triangles that lie whole between the
-/// receivers and the light, are opaque and nobody's own. A sample is blocked by one of them where their outlines, turned
-/// alike, wind around it, and edges between two of them cancel. What is left are the net edges: fixed ones, the same for
-/// all receivers, and those of triangles that some receivers may see from above and others from below.
+/// receivers and the light, are opaque and nobody's own. A sample is blocked by one of them where their outlines,
+/// turned alike, wind around it, and edges between two of them cancel. What is left are the net edges: fixed ones, the
+/// same for all receivers, and those of triangles that some receivers may see from above and others from below.
 HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& group, const ReceiverBox& box,
                           ExactScratch& scratch, GroupView& view) {
   constexpr std::uint16_t kAll = 0xffff;
@@ -151,7 +152,7 @@ class GroupOutline {
     const std::uint32_t turning = view.first + view.fixed;
     if (!CollectEdges(group, view, view.first, turning, false)) return false;
     edges_.fixed = edges_.count;
-    return CollectEdges(group, view, turning, turning + view.turning, true);
+    return view.turning == 0 || CollectEdges(group, view, turning, turning + view.turning, true);
   }
   bool empty() const { return edges_.count == 0; }
   HWY_INLINE void Set();
@@ -202,8 +203,8 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
   const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
   const NetEdges& net = scratch_.net_edges;
   const VertexProjection projection(scene_, packet_);
-  const std::uint16_t* const positive_of = scratch_.facing.data() + view.facing;
-  const std::uint16_t* const negative_of = positive_of + BlockerTree::kGroupSlots + 1;
+  const std::uint16_t* const positive_of = turning ? scratch_.facing.data() + view.facing : nullptr;
+  const std::uint16_t* const negative_of = turning ? positive_of + BlockerTree::kGroupSlots + 1 : nullptr;
   const std::uint32_t in_packet = (1u << packet_.count) - 1;
   const auto slot_of = [&](std::uint16_t v) {
     if (projected_in_[v] != calls_) {
@@ -251,7 +252,9 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
       }
     }
     if (bits == 0) continue;
-    if (edges_.count + static_cast<std::uint32_t>(std::popcount(twice)) + static_cast<std::uint32_t>(std::popcount(bits)) > OutlineEdges::kMost ||
+    if (edges_.count + static_cast<std::uint32_t>(std::popcount(twice)) +
+                static_cast<std::uint32_t>(std::popcount(bits)) >
+            OutlineEdges::kMost ||
         slots_ + 2 * static_cast<std::uint32_t>(std::popcount(bits)) > ProjectedVertices::kMost)
       return false;
     alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
@@ -319,8 +322,8 @@ HWY_INLINE void GroupOutline::Set() {
   }
 }
 
-/// Samples of row y that an edge passes so near to, for receivers for which one of its ends lies on the row so far as can
-/// be told, that its crossing the row or not is uncertain: within the errors of the ends the edge may turn.
+/// Samples of row y that an edge passes so near to, for receivers for which one of its ends lies on the row so far as
+/// can be told, that its crossing the row or not is uncertain: within the errors of the ends the edge may turn.
 HWY_INLINE UintVec GroupOutline::SamplesNearEnds(std::size_t e, Vec y, Vec offset, Vec rest) const {
   const Tag d;
   const std::size_t a = edges_.from[e], b = edges_.to[e];
@@ -411,8 +414,7 @@ HWY_INLINE UintVec GroupOutline::WindAround(std::uint32_t line, hn::Vec<IntTag> 
   doubtful = zero;
   WindingNumbers<kBits> winding;
   for (int i = 0; i < kBits; ++i) {
-    winding.bit[i] =
-        hn::IfThenElse(hn::TestBit(hn::BitCast(du, around), hn::Set(du, 1u << i)), ones, zero);
+    winding.bit[i] = hn::IfThenElse(hn::TestBit(hn::BitCast(du, around), hn::Set(du, 1u << i)), ones, zero);
   }
   doubtful = zero;
   for (std::size_t word = 0; word < std::size(edges_.on_row[0]); ++word) {
@@ -422,13 +424,12 @@ HWY_INLINE UintVec GroupOutline::WindAround(std::uint32_t line, hn::Vec<IntTag> 
       const Vec ya = hn::Load(d, vertices_.row[a]);
       const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
       LaneMask crossing = hn::Xor(behind, before);
-      if (e >= edges_.fixed)
-        crossing = hn::And(crossing, LanesFromBits(edges_.positive[e] | edges_.negative[e], 0));
+      if (e >= edges_.fixed) crossing = hn::And(crossing, LanesFromBits(edges_.positive[e] | edges_.negative[e], 0));
       if (edges_.near_row[e]) {
         UintVec near = SamplesNearEnds(e, y, offset, rest);
         if (e >= edges_.fixed) {
-          near = hn::IfThenElseZero(
-              hn::RebindMask(du, LanesFromBits(edges_.positive[e] | edges_.negative[e], 0)), near);
+          near =
+              hn::IfThenElseZero(hn::RebindMask(du, LanesFromBits(edges_.positive[e] | edges_.negative[e], 0)), near);
         }
         doubtful = hn::Or(doubtful, near);
       }

@@ -8,9 +8,12 @@
 namespace halfshade {
 
 /// Distance by which receivers are lifted off their surface, in half-widths of the local frame: 4 units in the last
-/// place of a float coordinate of size 1. Where far lights make the scene small in its frame, kReceiverLiftOfScene
-/// times the power of two from the meshes' largest coordinate on is less, and is taken.
-inline constexpr double kReceiverLift = 0x1p-21, kReceiverLiftOfScene = 0x1p-18;
+/// place of a float coordinate of size 1.
+inline constexpr double kReceiverLift = 0x1p-21;
+
+/// The same where far lights make the scene small in its frame and this is less: times the power of two from the
+/// meshes' largest coordinate on.
+inline constexpr double kReceiverLiftOfScene = 0x1p-18;
 
 /// ReceiverView::lift: as above, and as the receivers of a G-buffer.
 inline constexpr double kDefaultLift = -1.0;
