@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "shadows/blocker_tree.h"
 #include "shadows/light_view.h"
@@ -60,6 +61,51 @@ TEST_CASE("the blocker tree holds every triangle once, in full leaves, inside th
       }
     }
     CHECK(reached == static_cast<std::size_t>(count));
+  }
+}
+
+TEST_CASE("groups of the tree hold every edge of their triangles once, on its side") {
+  // Sixteen octahedra in a row.
+  std::vector<std::array<dvec3, 3>> triangles;
+  for (int i = 0; i < 16; ++i) {
+    const dvec3 c{3.0 * i, 0.0, 0.0};
+    for (int k = 0; k < 8; ++k) {
+      const dvec3 x{k & 1 ? 1.0 : -1.0, 0, 0}, y{0, k & 2 ? 1.0 : -1.0, 0}, z{0, 0, k & 4 ? 1.0 : -1.0};
+      const bool turned = std::popcount(static_cast<unsigned>(k)) % 2 == 0;
+      triangles.push_back({c + x, c + (turned ? z : y), c + (turned ? y : z)});
+    }
+  }
+  const Scene scene = scene_of(triangles);
+  const LatticeMesh mesh = make_lattice_mesh(scene, make_local_frame(scene.positions, light_extent(frame_light())));
+  BlockerTree tree;
+  build_blocker_tree(mesh, tree);
+  std::size_t seen = 0, sides = 0;
+  for (const BlockerTree::Node& node : tree.nodes) {
+    if (!node.is_group) continue;
+    const auto check = [&](const BlockerTree::Edge& edge, std::uint16_t triangle, std::uint16_t from,
+                           std::uint16_t to) {
+      if (triangle == BlockerTree::kGroupSlots) return;
+      ++sides;
+      const BlockerTree::Leaf& leaf = tree.leaves[node.first_leaf() + triangle / BlockerTree::kWidth];
+      const std::array<vec3, 3> corners = mesh.corners(leaf.triangle[triangle % BlockerTree::kWidth]);
+      const vec3 a = tree.vertices[node.first_vertex + from], b = tree.vertices[node.first_vertex + to];
+      bool found = false;
+      for (std::size_t k = 0; k < 3; ++k) found = found || (corners[k] == a && corners[(k + 1) % 3] == b);
+      CHECK(found);
+      CHECK(edge.from < edge.to);
+    };
+    for (std::uint32_t e = 0; e < node.edges; ++e) {
+      const BlockerTree::Edge& edge = tree.edges[node.first_edge + e];
+      check(edge, edge.left, edge.from, edge.to);
+      check(edge, edge.right, edge.to, edge.from);
+      seen += edge.left != BlockerTree::kGroupSlots && edge.right != BlockerTree::kGroupSlots;
+    }
+  }
+  CHECK(sides == 3 * triangles.size());
+  CHECK(seen >= 150);  // of 192 edges; the others lie between two groups
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const BlockerTree::Leaf& leaf = tree.leaves[tree.place[t] / BlockerTree::kWidth];
+    CHECK(leaf.triangle[tree.place[t] % BlockerTree::kWidth] == t);
   }
 }
 
