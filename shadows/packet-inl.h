@@ -141,6 +141,14 @@ struct LeafView {
   PictureRanges ranges;
 };
 
+/// Triangles that hide samples below them from receivers in a box: not those of closed components that none lies
+/// within, whose back faces suffice.
+HWY_INLINE std::uint32_t SamplesBelow(const BlockerTree::Leaf& leaf, const vec3& low, const vec3& high) {
+  const bool outside_box = low.x > leaf.box_high.x || low.y > leaf.box_high.y || low.z > leaf.box_high.z ||
+                           high.x < leaf.box_low.x || high.y < leaf.box_low.y || high.z < leaf.box_low.z;
+  return leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u);
+}
+
 /// On which side of the planes a box of receivers lies, and so whether they separate it from samples. Fills above,
 /// below and active.
 template <class View>
@@ -155,11 +163,8 @@ HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const ve
   const Vec error = hn::MulAdd(hn::Mul(hn::LoadU(d, leaf.side_error + i), far), hn::Set(d, 2.0f), reach);
   const auto above = static_cast<std::uint32_t>(Bits(hn::Gt(side, error))),
              below = static_cast<std::uint32_t>(Bits(hn::Lt(side, hn::Neg(error))));
-  const bool outside_box = low.x > leaf.box_high.x || low.y > leaf.box_high.y || low.z > leaf.box_high.z ||
-                           high.x < leaf.box_low.x || high.y < leaf.box_low.y || high.z < leaf.box_low.z;
   const std::uint32_t in_leaf = (1u << std::min<std::size_t>(leaf.count - i, hn::Lanes(d))) - 1;
-  const std::uint32_t samples_above = leaf.samples_above >> i,
-                      samples_below = (leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u)) >> i;
+  const std::uint32_t samples_above = leaf.samples_above >> i, samples_below = SamplesBelow(leaf, low, high) >> i;
   view.above |= above << i, view.below |= below << i;
   view.active |= (((samples_above & ~below) | (samples_below & ~above)) & in_leaf) << i;
 }

@@ -311,10 +311,7 @@ void PacketSolver::FindTurns(const BlockerTree::Node& group, GroupView& view, st
     if (view.turns[k] == 0) continue;
     const bool is_listed = (leaves >> k & 1) != 0;
     const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
-    const bool outside_box = cluster_.low.x > leaf.box_high.x || cluster_.low.y > leaf.box_high.y ||
-                             cluster_.low.z > leaf.box_high.z || cluster_.high.x < leaf.box_low.x ||
-                             cluster_.high.y < leaf.box_low.y || cluster_.high.z < leaf.box_low.z;
-    const std::uint32_t samples_below = leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u);
+    const std::uint32_t samples_below = SamplesBelow(leaf, cluster_.low, cluster_.high);
     for (std::uint32_t rest = view.turns[k]; rest != 0; rest &= rest - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
       const std::size_t at = BlockerTree::kWidth * k + lane;
