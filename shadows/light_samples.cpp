@@ -5,6 +5,7 @@
 
 #include "rasterizer/core/reuse.h"
 #include "rasterizer/core/unit_circle.h"
+#include "rasterizer/core/unit_vector.h"
 #include "shadows/polygon_light.h"
 #include "shadows/sample_patterns.h"
 
@@ -20,7 +21,7 @@ dvec3 unit_sphere_point(const dvec2& st) {
 namespace {
 
 void make_orthonormal(const dvec3& normal, LightSamples& samples) {
-  samples.axis_n = glm::normalize(normal);
+  samples.axis_n = unit_vector(normal);
   const dvec3 n = glm::abs(samples.axis_n);
   const dvec3 other = n.x <= n.y && n.x <= n.z ? dvec3(1, 0, 0) : (n.y <= n.z ? dvec3(0, 1, 0) : dvec3(0, 0, 1));
   samples.axis_u = glm::normalize(glm::cross(other, samples.axis_n));
@@ -69,7 +70,7 @@ void check_shape(const Light& light) {
           light, "a coordinate is not finite");
   require(light.radius >= 0.0, light, "the radius is negative");
   require(std::all_of(light.axes.begin(), light.axes.end(), is_finite), light, "a coordinate is not finite");
-  require(light.shape != LightShape::kDisk || glm::length(light.normal) > 0.0, light, "the normal is zero");
+  require(light.shape != LightShape::kDisk || light.normal != dvec3(0.0), light, "the normal is zero");
   if (light.shape == LightShape::kSamples) {
     check_sample_points(light);
     require(std::all_of(light.points.begin(), light.points.end(), is_finite), light, "a sample point is not finite");
@@ -78,7 +79,7 @@ void check_shape(const Light& light) {
 
 /// Gram and Schmidt; the axes stay those of the frame where the ellipsoid has no two independent ones.
 void describe_ellipsoid(const Light& light, LightSamples& samples) {
-  const auto& [a, b, c] = light.axes;
+  const dvec3 a = near_one(light.axes[0]), b = near_one(light.axes[1]);
   const dvec3 n = glm::cross(a, b);
   if (!(glm::length(n) > 1e-9 * glm::length(a) * glm::length(b))) return;
   samples.axis_u = glm::normalize(a);
@@ -89,12 +90,12 @@ void describe_ellipsoid(const Light& light, LightSamples& samples) {
 /// A rectangle without area (a segment or a point) is not flat: it has no facing, and the general, volumetric treatment
 /// covers it.
 void describe_rectangle(const Light& light, LightSamples& samples) {
-  const dvec3 normal = glm::cross(light.u, light.v);
+  const dvec3 u = near_one(light.u), v = near_one(light.v), normal = glm::cross(u, v);
   const double length = glm::length(normal);
-  samples.flat = length > 1e-9 * glm::length(light.u) * glm::length(light.v) && length > 0.0;
+  samples.flat = length > 1e-9 * glm::length(u) * glm::length(v);
   if (!samples.flat) return;
   samples.axis_n = normal / length;
-  samples.axis_u = glm::normalize(light.u);
+  samples.axis_u = glm::normalize(u);
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
 }
 

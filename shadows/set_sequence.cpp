@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rasterizer/core/unit_vector.h"
+
 namespace halfshade {
 namespace {
 
@@ -21,7 +23,7 @@ LightSamples make_row_sets(const Light& light, const LocalFrame& frame, const Se
   const dvec3 along = round.index % 2 == 1 ? light.v : light.u;
   dvec3 across = round.index % 2 == 1 ? light.u : light.v;
   if (glm::dot(glm::cross(samples.axis_n, along), across) < 0.0) across = -across;  // rows rise along axis_v
-  samples.axis_u = glm::normalize(along);
+  samples.axis_u = unit_vector(along);
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
   samples.points.clear(), samples.st.clear();
   const std::uint32_t rows = shape.rows * round.count;

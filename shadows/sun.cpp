@@ -1,10 +1,10 @@
 // The sun as a disk far away: see place_sun (halfshade/light.h).
-#include <algorithm>
 #include <cmath>
 
 #include "halfshade/error.h"
 #include "halfshade/light.h"
 #include "rasterizer/core/lattice.h"
+#include "rasterizer/core/unit_vector.h"
 
 namespace halfshade {
 
@@ -22,9 +22,7 @@ Light place_sun(const Light& light, const dvec3& low, const dvec3& high) {
   constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180.0;
   Light disk = light;
   disk.shape = LightShape::kDisk;
-  // Scaled first: the length of a huge or tiny vector would overflow or vanish.
-  const dvec3 size = glm::abs(light.normal);
-  disk.normal = glm::normalize(light.normal / std::max({size.x, size.y, size.z}));
+  disk.normal = unit_vector(light.normal);
   disk.center = low + (high - low) * 0.5 - disk.normal * distance;
   disk.radius = distance * std::tan(light.angular_diameter_deg * 0.5 * kRadiansPerDegree);
   return disk;

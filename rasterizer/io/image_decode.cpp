@@ -160,7 +160,7 @@ class Decoder {
     if (format.empty()) throw error("is not a PNG, JPEG or EXR picture, the only kinds allowed");
     if (format == "png" && !is_whole_png(bytes)) throw error("PNG is truncated or damaged");
     if (format == "jpeg" && !is_whole_jpeg(bytes)) throw error("JPEG is truncated or damaged");
-    if (format == "openexr" && !has_credible_exr_header(bytes)) throw error("EXR is truncated or damaged");
+    if (format == "openexr") check_exr_header(bytes);
     OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
     const auto input = open(format, memory);
     check_spec(input->spec());
@@ -176,6 +176,15 @@ class Decoder {
  private:
   Error error(const std::string& what, ErrorCode code = ErrorCode::kBadInput) const {
     return Error(code, fmt::format("{}: {}", file_.string(), what));
+  }
+
+  void check_exr_header(std::string_view bytes) const {
+    const auto buffer = exr_buffer_bytes(bytes);
+    if (!buffer.has_value()) throw error("EXR is truncated or damaged");
+    if (*buffer <= limits_.max_bytes) return;
+    throw error(fmt::format("rows that are compressed together, or a tile, of {} bytes, allowed at most {}", *buffer,
+                            limits_.max_bytes),
+                ErrorCode::kLimit);
   }
 
   static std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }

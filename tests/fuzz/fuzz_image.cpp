@@ -1,4 +1,4 @@
-// Pictures as texture, opacity and emission. At most 64 MiB of pixels, so that a run stays in little memory; the reader
+// Pictures as texture, opacity and emission. At most 16 MiB of pixels, so that a run stays in little memory; the reader
 // itself takes the limit as an argument.
 #include <cmath>
 
@@ -10,7 +10,7 @@
 namespace halfshade::fuzz {
 namespace {
 
-constexpr DecodeLimits kLimits{.max_side = 32768, .max_bytes = std::uint64_t{1} << 26};
+constexpr DecodeLimits kLimits{.max_side = 32768, .max_bytes = std::uint64_t{1} << 24};
 constexpr std::uint64_t kMostPixels = 1 << 16;  // whose values are looked at
 
 void check_values(const DecodedImage& image) {

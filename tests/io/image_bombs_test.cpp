@@ -45,13 +45,13 @@ std::string exr_attribute(const std::string& name, const std::string& type, cons
   return name + '\0' + type + '\0' + little_endian(static_cast<std::uint32_t>(value.size())) + value;
 }
 
-// Scanline EXR with one half channel, no compression and an empty body; `more` are further attributes.
-std::string exr_bomb(std::uint32_t width, std::uint32_t height, const std::string& more = "") {
+// Scanline EXR with one half channel and an empty body, not compressed unless told; `more` are further attributes.
+std::string exr_bomb(std::uint32_t width, std::uint32_t height, const std::string& more = "", char compression = 0) {
   const std::string window = little_endian(0) + little_endian(0) + little_endian(width - 1) + little_endian(height - 1);
   const std::string channel =
       std::string("R\0", 2) + little_endian(1) + std::string(4, '\0') + little_endian(1) + little_endian(1) + '\0';
   return little_endian(20000630) + little_endian(2) + exr_attribute("channels", "chlist", channel) +
-         exr_attribute("compression", "compression", std::string(1, '\0')) +
+         exr_attribute("compression", "compression", std::string(1, compression)) +
          exr_attribute("dataWindow", "box2i", window) + exr_attribute("displayWindow", "box2i", window) +
          exr_attribute("lineOrder", "lineOrder", std::string(1, '\0')) +
          exr_attribute("pixelAspectRatio", "float", little_endian(0x3f800000)) +
@@ -101,6 +101,25 @@ TEST_CASE(
   // OpenEXR reads four bytes here whatever the length says, and takes what follows for the next attribute.
   check_bomb(
       exr_bomb(4, 4, exr_attribute("extra", "int", std::string(4, '\0') + name_and + "opaque" + '\0' + gigabyte)));
+}
+
+TEST_CASE("S38 image_bombs: EXR rows that are compressed together, and tiles, are refused before memory is set aside") {
+  constexpr char kZip = 3, kDwab = 9, kUnknown = 11;
+  const Scratch scratch;
+  for (const char compression : {kZip, kDwab, kUnknown}) {
+    const std::string bomb = exr_bomb(0x7ffffff0, 1, "", compression);
+    CHECK(decode(scratch.write("bomb", bomb)).has("allowed at most 1073741824"));
+    check_bomb(bomb);
+  }
+  const auto tile = [](std::uint32_t side) {
+    return exr_attribute("tiles", "tiledesc", little_endian(side) + little_endian(side) + '\0');
+  };
+  for (const std::uint32_t side : {40000u, 0x7fffffffu, 0xffffffffu}) {
+    CHECK(decode(scratch.write("bomb", exr_bomb(4, 4, tile(side)))).has("allowed at most 1073741824"));
+    check_bomb(exr_bomb(4, 4, tile(side)));
+  }
+  // Rows of pictures that are allowed pass this check; this one fails behind it, as it has no pixels.
+  CHECK_FALSE(decode(scratch.write("picture", exr_bomb(32768, 1, tile(64), kDwab))).has("allowed at most"));
 }
 
 TEST_CASE("S38 image_bombs: a bomb as texture stops the loading") {

@@ -132,6 +132,28 @@ TEST_CASE("degenerate lights are described, wrong ones refused with the light's 
   CHECK_THROWS_AS(samples_of(light, 16, SamplePattern::kRows), Error);
 }
 
+TEST_CASE("directions whose squares do not fit a double are directions all the same") {
+  Light light = frame_light();
+  light.shape = LightShape::kDisk, light.radius = 1.0, light.normal = {3, -2, 1};
+  const LightSamples disk = samples_of(light, 64, SamplePattern::kStratified);
+  for (const int exponent : {-1000, -600, 600, 1000}) {
+    light.normal = {std::ldexp(3.0, exponent), std::ldexp(-2.0, exponent), std::ldexp(1.0, exponent)};
+    const LightSamples scaled = samples_of(light, 64, SamplePattern::kStratified);
+    CHECK(scaled.axis_n == disk.axis_n);
+    CHECK(scaled.axis_u == disk.axis_u);
+    CHECK(scaled.points == disk.points);
+  }
+  light = frame_light();
+  light.u = {1e-200, 0, 0}, light.v = {0, 0, 1e-250};
+  const LightSamples tiny = samples_of(light, 16, SamplePattern::kRows);
+  CHECK(tiny.flat);
+  CHECK(tiny.axis_u == dvec3(1, 0, 0));
+  CHECK(tiny.axis_n.y == -1.0);
+  light.shape = LightShape::kEllipsoid;
+  light.axes = {dvec3(1e-200, 0, 0), dvec3(0, 1e-220, 0), dvec3(0, 0, 1e-240)};
+  CHECK(samples_of(light, 16, SamplePattern::kRows).axis_n.z == doctest::Approx(1.0));
+}
+
 TEST_CASE("low-discrepancy: every first 2^m samples have one in each elementary interval, for every seed and set") {
   for (const std::uint32_t seed : {0u, 1u, 77u}) {
     for (const std::uint32_t set : {0u, 1u, 200u}) {
