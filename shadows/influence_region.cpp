@@ -138,8 +138,10 @@ void scan_convert(const LightView& view, double pad, InfluenceRegion& region) {
 void convex_hull(std::vector<dvec2>& points, std::vector<dvec2>& hull) {
   std::sort(points.begin(), points.end(),
             [](const dvec2& a, const dvec2& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  // From b: then only the angle there is rounded, in units of 2^-53. Images that a point light shows of one corner are
+  // apart by no more than rounding; from a far `a` the turn between two of them would be anything.
   const auto turns_left = [](const dvec2& a, const dvec2& b, const dvec2& c) {
-    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) > 0.0;
+    return (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) > 0.0;
   };
   hull.clear();
   const auto add = [&](const dvec2& p, std::size_t keep) {

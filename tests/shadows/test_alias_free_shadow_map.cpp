@@ -141,6 +141,28 @@ TEST_CASE("the convex hull holds every point and turns left at every corner") {
   }
 }
 
+TEST_CASE("the convex hull holds every point where some are apart by no more than rounding") {
+  Random random(4);
+  for (int round = 0; round < 2000; ++round) {
+    std::vector<dvec2> corners, points, hull;
+    for (int i = 0; i < 3; ++i) {
+      corners.emplace_back(random.uniform(-5, 5), random.uniform(-5, 5));
+      for (int copy = 0; copy < 9; ++copy) {
+        const auto moved = [&](double x) { return x + std::floor(random.uniform(-1, 2)) * 0x1p-52 * std::fabs(x); };
+        points.emplace_back(moved(corners.back().x), moved(corners.back().y));
+      }
+    }
+    convex_hull(points, hull);
+    double twice = 0.0;  // areas, both ways round
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+      const dvec2 a = hull[i], b = hull[(i + 1) % hull.size()];
+      twice += a.x * b.y - a.y * b.x;
+    }
+    const dvec2 e = corners[1] - corners[0], f = corners[2] - corners[0];
+    CHECK(twice == doctest::Approx(std::fabs(e.x * f.y - e.y * f.x)).epsilon(1e-6));
+  }
+}
+
 TEST_CASE("a blocker behind the light hides nothing") {
   const Scene scene = scene_of(quad({-9, 5, -9}, {9, 5, -9}, {9, 5, 9}, {-9, 5, 9}));
   Random random(1);
