@@ -15,23 +15,11 @@ VisibilityMasks gears(const Scene& scene, const std::vector<Receiver>& receivers
   return solve(scene, receivers, light, config, ShadowMethod::kGears, stats);
 }
 
-/// Tiny triangles close below the light (stability.md D3).
-std::vector<Triangle> swarm_at_light(Random& random, int count) {
-  std::vector<Triangle> triangles;
-  for (int i = 0; i < count; ++i) {
-    const dvec3 center(random.uniform(-1, 1), 4.0 - random.uniform(0.001, 0.01), random.uniform(-1, 1));
-    triangles.push_back({center + 1e-3 * random.in_box(-1, 1), center + 1e-3 * random.in_box(-1, 1),
-                         center + 1e-3 * random.in_box(-1, 1)});
-  }
-  return triangles;
-}
-
 }  // namespace
 
 TEST_CASE(
     "S25 hot_cell_memory: gears: a swarm at the light stays within the pair budget and gives the oracle's masks") {
-  Random random(25);
-  const Scene scene = scene_of(swarm_at_light(random, 3000));
+  const Scene scene = scene_of(cases::swarm_at_light(25, 3000));
   std::vector<dvec3> points;
   for (int i = 0; i < 400; ++i) points.push_back({i % 20 * 0.5 - 5.0, 0.0, i / 20 * 0.5 - 5.0});
   const std::vector<Receiver> receivers = receivers_at(points);
@@ -52,7 +40,6 @@ TEST_CASE(
 }
 
 TEST_CASE("S25 hot_cell_memory: gears: memory grows with the swarm's size, not with its product with the grid") {
-  Random random(26);
   std::vector<dvec3> points;
   for (int i = 0; i < 64; ++i) points.push_back({i % 8 - 3.5, 0.0, i / 8 - 3.5});
   ShadowConfig config = frame_config(1);
@@ -61,7 +48,7 @@ TEST_CASE("S25 hot_cell_memory: gears: memory grows with the swarm's size, not w
   std::array<double, 2> bytes{};
   for (std::size_t k = 0; k < 2; ++k) {
     ShadowStats stats;
-    const Scene scene = scene_of(swarm_at_light(random, k == 0 ? 20000 : 40000));
+    const Scene scene = scene_of(cases::swarm_at_light(26, k == 0 ? 20000 : 40000));
     gears(scene, receivers_at(points), config, &stats);
     bytes[k] = static_cast<double>(stats.bytes);
     CHECK(stats.detail("gears.pairs_in_flight_max").value() <= config.gears.pair_budget);
