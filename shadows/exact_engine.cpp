@@ -249,6 +249,10 @@ void ExactWork::reserve(std::size_t count, std::size_t words) {
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {
   kept.unfit();
   kept.bound = make_light_bound(light, samples, std::move(kept.bound));
+  prepare_exact_samples(samples, kept);
+}
+
+void prepare_exact_samples(const LightSamples& samples, ExactLight& kept) {
   const auto samples_in = [&](SampleOrder order) {
     kept.samples = make_kernel_samples(samples, kept.bound, order, std::move(kept.samples));
   };

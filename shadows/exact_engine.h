@@ -80,6 +80,9 @@ struct ExactWork {
 /// For flat lights. What `kept` held before gives its memory.
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept);
 
+/// The samples alone, all within kept.bound. Sides stay as they were fitted.
+void prepare_exact_samples(const LightSamples& samples, ExactLight& kept);
+
 /// Masks of all receivers, exact, by a light that was prepared. Allocates nothing where `work` has room for the
 /// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane.
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,

@@ -15,6 +15,8 @@ namespace {
 constexpr double kAround = 1.0 + 1e-5;  // corners of the light's region are moved outwards by this factor
 /// Masks of so many words are held at once.
 constexpr std::size_t kWordsAtOnce = std::size_t{1} << 22;
+constexpr double kLatticeSlack = 0x1p-36;  // more than a sample may lie off the light's plane for being on the lattice
+constexpr double kFarthest = 8.0;          // no two points of the lattice are so far from each other
 
 /// Receivers `which`, all with set `set`.
 ReceiverArray selection(const ReceiverArray& receivers, std::span<const std::uint32_t> which, std::uint32_t set) {
@@ -34,6 +36,41 @@ std::vector<vec3> region_corners(const Light& light, const LightSamples& samples
     corners.push_back(snap_to_lattice(samples.center + frame.to_local_vector(offset * kAround)));
   }
   return corners;
+}
+
+/// Around all sets of a light with these corners.
+LightBound bound_of_sets(const Light& light, const LightSamples& samples, std::span<const vec3> corners) {
+  LightSamples region = samples;
+  region.points.assign(corners.begin(), corners.end());
+  LightBound bound = make_light_bound(light, region);
+  const std::array<dvec3, 3> axes = {samples.axis_u, samples.axis_v, samples.axis_n};
+  for (std::size_t k = 0; k < 3; ++k) bound.half_axes[k] += axes[k] * kLatticeSlack;
+  return bound;
+}
+
+float reach_of(const LightBound& bound) {
+  dvec3 reach(0.0);
+  for (const dvec3& axis : bound.half_axes) reach += glm::abs(axis);
+  return static_cast<float>(std::max({reach.x, reach.y, reach.z}) * kAround);
+}
+
+/// Have the axes in the light's plane changed places?
+bool is_turned(const LightFrame& from, const LightFrame& to) { return std::fabs(glm::dot(from.u, to.u)) < 0.5; }
+
+/// Boxes in one frame from those in another that is turned by a right angle around the light's normal, either way.
+void turn_boxes(const LightFrame& from, const LightFrame& to, BlockerTree& tree) {
+  const double sign[2] = {glm::dot(to.u, from.v) < 0.0 ? -1.0 : 1.0, glm::dot(to.v, from.u) < 0.0 ? -1.0 : 1.0};
+  const double off = std::max(glm::length(to.u - sign[0] * from.v), glm::length(to.v - sign[1] * from.u));
+  const float pad = static_cast<float>(kFarthest * off) + 0x1p-21f;  // the latter for rounding
+  for (BlockerTree::Node& node : tree.nodes) {
+    for (std::uint32_t i = 0; i < BlockerTree::kWidth; ++i) {
+      const float low[2] = {node.low[1][i], node.low[0][i]}, high[2] = {node.high[1][i], node.high[0][i]};
+      for (int k = 0; k < 2; ++k) {
+        node.low[k][i] = (sign[k] > 0.0 ? low[k] : -high[k]) - pad;
+        node.high[k][i] = (sign[k] > 0.0 ? high[k] : -low[k]) + pad;
+      }
+    }
+  }
 }
 
 /// Samples anywhere, one in each of `shape`'s cells: how many neighbouring cells differ.
@@ -123,12 +160,38 @@ LevelEngine::LevelEngine(const LatticeMesh& mesh, const ReceiverArray& receivers
   stats.build_ms += watch.lap();
 }
 
+/// Blockers are fitted to the light once: what they hold of it is true of all its sets, and their boxes turn with rows.
+void LevelEngine::prepare(const LightSamples& samples) {
+  if (corners_.empty()) {
+    prepare_exact_light(light_, samples, kept_);
+    return;
+  }
+  const bool first = !kept_.bound.flat;
+  if (first) kept_.bound = bound_of_sets(light_, samples, corners_);
+  const LightFrame before = kept_.front;
+  prepare_exact_samples(samples, kept_);
+  kept_.samples.reach = std::max(kept_.samples.reach, reach_of(kept_.bound));
+  if (first || !is_turned(before, kept_.front)) return;
+  for (ExactSide& side : kept_.sides) {
+    if (side.fitted) turn_boxes(before, kept_.front, side.tree);
+  }
+}
+
+/// Certificates that did not hold for some set or some receivers are not tried again: for that blockers would have to
+/// be fitted anew.
+void LevelEngine::give_up_withdrawn_certificates() {
+  for (std::size_t c = 0; c < kept_.samples.closed_usable.size(); ++c) {
+    if (kept_.samples.closed_usable[c] == 0) closed_.boxes[c] = {vec3(-kFarthest), vec3(kFarthest)};
+  }
+}
+
 void LevelEngine::solve(const LightSamples& samples, const ReceiverArray& part) {
   const std::uint64_t certified = stats_.certified_blockers;
   if (flat_) {
     const ExactBlockers blockers{mesh_, config_.back_face_casters ? &closed_ : nullptr,
                                  samples.one_sided ? nullptr : &tree_};
     solve_exact(blockers, part, light_, samples, config_, kept_, work_, masks_, stats_);
+    give_up_withdrawn_certificates();
   } else {
     ShadowStats own;
     solve_masks(mesh_, part, light_, samples, config_, masks_, own);
@@ -145,7 +208,7 @@ void LevelEngine::solve_round(const SetShape& shape, const SetRound& round, std:
   if (mesh_.triangles.empty()) answers.assign(which.size(), {shape.size() * round.count, 0});
   if (mesh_.triangles.empty() || which.empty()) return;
   const LightSamples samples = make_sets(light_, config_, mesh_.frame, shape, round);
-  if (flat_) prepare_exact_light(light_, samples, kept_);
+  if (flat_) prepare(samples);
   std::vector<std::uint32_t> cell_of;  // [set][sample]
   for (const dvec2& st : samples.st) {
     cell_of.push_back(static_cast<std::uint32_t>(st.y * shape.rows) * shape.columns +

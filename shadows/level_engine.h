@@ -26,6 +26,8 @@ class LevelEngine {
   bool uses_rows() const { return rows_; }
 
  private:
+  void prepare(const LightSamples& samples);
+  void give_up_withdrawn_certificates();
   void solve(const LightSamples& samples, const ReceiverArray& part);
   const ExactSide* side_of(std::span<const std::uint32_t> which, LightFrame& frame) const;
 
