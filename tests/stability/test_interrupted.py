@@ -20,7 +20,7 @@ import time
 import unittest
 
 PROGRAM = os.path.abspath(sys.argv.pop(1)) if len(sys.argv) > 1 else "halfshade"
-KILLS = int(sys.argv.pop(2)) if sys.argv[1:2] == ["--kills"] and sys.argv.pop(1) else 8
+KILLS = int(sys.argv.pop(1)) if sys.argv[1:2] == ["--kills"] and sys.argv.pop(1) else 8
 OK, DIFFERENT, USAGE, BAD_INPUT, LIMIT, OUTPUT = range(6)
 INTERRUPTED = 130
 

@@ -121,5 +121,5 @@ TEST_CASE("S45_long ref_disagree: the same with more aims") {
     MESSAGE("skipped: built without Embree");
     return;
   }
-  compare_with_embree(100);
+  compare_with_embree(32);
 }
