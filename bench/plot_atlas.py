@@ -33,7 +33,7 @@ def caption(entry, answer):
         share = answer["unreasoned_flips"] / answer["flips_asked"]
         return f'{name}\n{100 * share:.2g} % flip, F {answer["flicker"]:.1e}'
     if "lit_facing_away" in answer:
-        return f'{name.replace(", ", ",\n")}\n{100 * answer["lit_facing_away"]:.2g} % lit facing away'
+        return name.replace(", ", ",\n") + f'\n{100 * answer["lit_facing_away"]:.2g} % lit facing away'
     bits = f', {answer["wrong_bits"]} bits' if "wrong_bits" in answer else ""
     return f'{name}\noff by {answer["max"]:.2g}{bits}'
 

@@ -101,11 +101,11 @@ TEST_CASE("S01 vertex_aim: from inside to vertices and just beyond or before the
   CHECK(wrong_against_integers(c.scene, c.receivers, c.light, c.config) == 0);
 }
 
-TEST_CASE("S01_long vertex_aim: a million aims at each sphere, by every method") {
+TEST_CASE("S01_long vertex_aim: a million aims at each sphere, 700,000 by every method") {
   for (const Sphere& sphere : {Sphere(32, 64), Sphere(100, 200)}) check_fans(sphere, 1000000);
   for (const int rings : {32, 100}) {
-    const std::vector<StabilityCase> cases = sphere_aims(false, rings, 2 * rings, rings == 32 ? 504 : 245);
-    CHECK(aims_of(cases) >= 1000000);
+    const std::vector<StabilityCase> cases = sphere_aims(false, rings, 2 * rings, rings == 32 ? 252 : 49);
+    CHECK(aims_of(cases) >= (rings == 32 ? 500000u : 200000u));
     CHECK(leaks_of_exact_methods(cases, rings == 32 ? 12 : 24) == 0);
     CHECK(not_crossed_once(cases) == 0);
   }
@@ -121,10 +121,10 @@ TEST_CASE("S02 edge_aim: segments through edge mid-points and random edge points
   CHECK(wrong_against_integers(c.scene, c.receivers, c.light, c.config) == 0);
 }
 
-TEST_CASE("S02_long edge_aim: a million aims at each sphere, by every method") {
+TEST_CASE("S02_long edge_aim: 700,000 aims by every method") {
   for (const int rings : {32, 100}) {
-    const std::vector<StabilityCase> cases = sphere_aims(true, rings, 2 * rings, 245);
-    CHECK(aims_of(cases) >= 1000000);
+    const std::vector<StabilityCase> cases = sphere_aims(true, rings, 2 * rings, rings == 32 ? 123 : 49);
+    CHECK(aims_of(cases) >= (rings == 32 ? 500000u : 200000u));
     CHECK(leaks_of_exact_methods(cases, rings == 32 ? 12 : 24) == 0);
     CHECK(not_crossed_once(cases) == 0);
   }
