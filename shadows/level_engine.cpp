@@ -18,14 +18,18 @@ constexpr std::size_t kWordsAtOnce = std::size_t{1} << 22;
 constexpr double kLatticeSlack = 0x1p-36;  // more than a sample may lie off the light's plane for being on the lattice
 constexpr double kFarthest = 8.0;          // no two points of the lattice are so far from each other
 
-/// Receivers `which`, all with set `set`.
-ReceiverArray selection(const ReceiverArray& receivers, std::span<const std::uint32_t> which, std::uint32_t set) {
-  ReceiverArray part;
-  for (const std::uint32_t i : which) {
-    part.push_back(receivers.position[i], receivers.normal[i], receivers.triangle[i], receivers.sample[i],
-                   static_cast<std::uint8_t>(set));
-  }
-  return part;
+/// Receivers `which`, all with set `set`, into memory that is kept from round to round.
+void select(const ReceiverArray& receivers, std::span<const std::uint32_t> which, std::uint32_t set,
+            ReceiverArray& part) {
+  part.resize(which.size());
+  parallel_ranges(which.size(), 8192, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k != end; ++k) {
+      const std::uint32_t i = which[k];
+      part.position[k] = receivers.position[i], part.normal[k] = receivers.normal[i];
+      part.triangle[k] = receivers.triangle[i], part.sample[k] = receivers.sample[i];
+      part.set[k] = static_cast<std::uint8_t>(set);
+    }
+  });
 }
 
 /// Corners around a rectangle.
@@ -218,7 +222,8 @@ void LevelEngine::solve_round(const SetShape& shape, const SetRound& round, std:
   for (std::size_t begin = 0; begin < which.size(); begin += at_once) {
     const auto some = which.subspan(begin, std::min(at_once, which.size() - begin));
     for (std::uint32_t set = 0; set < round.count; ++set) {  // one by one: packets of a single set are faster
-      solve(samples, selection(receivers_, some, set));
+      select(receivers_, some, set, part_);
+      solve(samples, part_);
       const RunMeter meter(rows_ ? shape : SetShape{}, round, set);
       const auto cells = std::span(cell_of).subspan(std::size_t{set} * samples.count, samples.count);
       parallel_ranges(some.size(), 1024, [&](std::size_t from, std::size_t to) {

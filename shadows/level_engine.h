@@ -43,6 +43,7 @@ class LevelEngine {
   ExactLight kept_;
   ExactWork work_;
   VisibilityMasks masks_;
+  ReceiverArray part_;         // that is being solved
   std::vector<vec3> corners_;  // of a convex region around the light, on the lattice; none if that is no rectangle
 };
 

@@ -118,7 +118,7 @@ void stop_at_random(std::uint32_t rings, std::uint32_t side, int stops) {
 
 TEST_CASE("S43: stopped at random ticks, by false or by an exception") { stop_at_random(40, 48, 100); }
 
-TEST_CASE("S43_long: the same in a scene of a million triangles") { stop_at_random(500, 128, 24); }
+TEST_CASE("S43_long: the same in a scene of a million triangles") { stop_at_random(500, 128, 12); }
 
 TEST_CASE("S43: memory runs out at each of the first 500 allocations") {
   const Ground ground(24);
