@@ -148,6 +148,17 @@ dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2
   }
 }
 
+/// Places in the unit square, [set][sample].
+std::vector<dvec2> pattern_samples(const PatternKey& key, std::vector<dvec2> reuse) {
+  std::vector<dvec2> st =
+      unit_square_samples(key.pattern, key.count, key.frame, key.rotate ? 1 : key.sets, key.seed, std::move(reuse));
+  st.resize(std::size_t{key.sets} * key.count);
+  if (key.rotate) {
+    for (std::size_t i = key.count; i < st.size(); ++i) st[i] = st[i - key.count];
+  }
+  return st;
+}
+
 }  // namespace
 
 std::uint32_t number_of_sets(const Light& light, const ShadowConfig& config) {
@@ -196,11 +207,10 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
   }
   samples.count = samples_of(light, config);
   const bool rotate = config.rotate_sets && (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere);
-  samples.st = unit_square_samples(config.pattern, samples.count, config.frame, rotate ? 1 : samples.sets, config.seed,
-                                   emptied(reuse.st));
-  samples.st.resize(std::size_t{samples.sets} * samples.count);
+  samples.st_key = {config.pattern, samples.count, samples.sets, config.seed, config.frame, rotate};
+  samples.st =
+      reuse.st_key == samples.st_key ? std::move(reuse.st) : pattern_samples(samples.st_key, emptied(reuse.st));
   for (std::size_t i = 0; i < samples.st.size(); ++i) {
-    if (rotate) samples.st[i] = samples.st[i % samples.count];
     const dvec2 st = samples.st[i];
     const auto turn = rotate ? config.frame + static_cast<std::uint32_t>(i / samples.count) : 0;
     const dvec3 offset =

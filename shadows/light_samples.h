@@ -12,12 +12,22 @@ inline constexpr std::uint32_t kMaxFrames = 1u << 25;
 
 inline constexpr std::uint32_t kInterleavedSets = 16;
 
+/// All that the places of samples in the unit square depend on.
+struct PatternKey {
+  SamplePattern pattern = SamplePattern::kRows;
+  std::uint32_t count = 0, sets = 0, seed = 0, frame = 0;
+  bool rotate = false;  // the sets are copies of the first
+
+  bool operator==(const PatternKey&) const = default;
+};
+
 /// Samples of one light on the lattice of a local frame.
 struct LightSamples {
   std::uint32_t count = 0, sets = 1;
   bool interleaved = false;  // sets are chosen by place in a 4x4 pattern of pixels, not by hash
   std::vector<vec3> points;  // [set][sample]
   std::vector<dvec2> st;     // [set][sample] in [0,1)^2, what the pattern gave; empty for explicit samples
+  PatternKey st_key;         // what `st` was made of; of 0 samples where not by make_light_samples
   dvec3 center{0.0};         // local frame
   bool flat = false;         // all samples lie (up to rounding) in one plane through `center`
   bool one_sided = false;    // flat, and receivers at or behind the plane get no light
@@ -28,8 +38,8 @@ struct LightSamples {
 };
 
 /// Throws Error{kUsage} for counts out of range, Error{kBadInput} for a degenerate light (message names the light).
-/// `reuse` gives its memory: with samples of an earlier place of the light nothing is allocated, but for polygons and
-/// Poisson disks.
+/// `reuse` gives its memory, and `st` where the pattern is the same: with samples of an earlier place of the light
+/// nothing is allocated.
 LightSamples make_light_samples(const Light& light, const ShadowConfig& config, const LocalFrame& frame,
                                 LightSamples reuse = {});
 

@@ -44,17 +44,21 @@ std::vector<dvec2> polygon_around(const LightSamples& samples, const dvec3& cent
   return polygon;
 }
 
-/// `outline` (around its own origin, which lies inside) scaled so that it holds all points, relative to `origin`.
-std::vector<dvec2> polygon_scaled_around(const std::vector<dvec2>& points, const std::vector<dvec2>& outline,
-                                         const dvec2& origin) {
+/// The light's outline (around its own origin, which lies inside) scaled so that it holds all samples, relative to
+/// `center`, which is `origin` there.
+std::vector<dvec2> polygon_scaled_around(const LightSamples& samples, const dvec3& center,
+                                         const std::array<dvec3, 3>& axes, const dvec2& origin,
+                                         std::vector<dvec2> polygon) {
+  const std::vector<dvec2>& outline = samples.outline;
   double scale = 1.0;
   for (std::size_t i = 0; i < outline.size(); ++i) {
     const dvec2 edge = outline[(i + 1) % outline.size()] - outline[i], normal(edge.y, -edge.x);
     const double support = glm::dot(outline[i], normal);
     if (!(support > 0.0)) continue;  // corners that coincide
-    for (const dvec2& p : points) scale = std::max(scale, glm::dot(p + origin, normal) / support);
+    for (const vec3& l : samples.points) {
+      scale = std::max(scale, glm::dot(in_plane(l, center, axes) + origin, normal) / support);
+    }
   }
-  std::vector<dvec2> polygon;
   for (const dvec2& corner : outline) polygon.push_back(corner * (scale * kWiden) - origin);
   return polygon;
 }
@@ -264,10 +268,9 @@ LightBound make_light_bound(const Light& light, const LightSamples& samples, Lig
   for (int k = 0; k < 3; ++k) bound.half_axes[k] = axes[k] * (reach[k] * kWiden);
   if (bound.flat && light.shape == LightShape::kPolygon) {
     const dvec3 shift = dvec3(bound.center) - samples.center;
-    std::vector<dvec2> points;
-    for (const vec3& l : samples.points) points.push_back(in_plane(l, dvec3(bound.center), axes));
     bound.outline =
-        polygon_scaled_around(points, samples.outline, {glm::dot(shift, axes[0]), glm::dot(shift, axes[1])});
+        polygon_scaled_around(samples, dvec3(bound.center), axes, {glm::dot(shift, axes[0]), glm::dot(shift, axes[1])},
+                              std::move(bound.outline));
   } else if (bound.flat) {
     const int corners = light.shape == LightShape::kRectangle ? 4 : 8;
     bound.outline = polygon_around(samples, dvec3(bound.center), axes, corners, std::move(bound.outline));

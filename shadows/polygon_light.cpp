@@ -8,7 +8,8 @@
 namespace halfshade {
 namespace {
 
-constexpr std::size_t kMostCorners = 64;
+constexpr std::size_t kMostCorners = PolygonLight::kMostCorners;
+using Corners = BoundedVector<dvec2, kMostCorners>;
 constexpr double kTolerance = 1e-6;  // of the polygon's size: how far it may be from flat and convex
 
 [[noreturn]] void refuse(const Light& light, const std::string& what) {
@@ -31,7 +32,7 @@ void set_axes(const Light& light, double size, PolygonLight& polygon) {
 }
 
 /// Every corner lies on the inner side of every edge.
-void check_convex(const Light& light, double size, const std::vector<dvec2>& corners) {
+void check_convex(const Light& light, double size, const Corners& corners) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const dvec2 p = corners[i], edge = corners[(i + 1) % corners.size()] - p;
     const double length = glm::length(edge);
@@ -43,7 +44,7 @@ void check_convex(const Light& light, double size, const std::vector<dvec2>& cor
 }
 
 /// Chord of the polygon at a height: its ends in axis_u.
-dvec2 chord(const std::vector<dvec2>& corners, double height) {
+dvec2 chord(const Corners& corners, double height) {
   double left = HUGE_VAL, right = -HUGE_VAL;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     dvec2 p = corners[i], q = corners[(i + 1) % corners.size()];
@@ -57,7 +58,7 @@ dvec2 chord(const std::vector<dvec2>& corners, double height) {
 }
 
 void make_slabs(PolygonLight& polygon) {
-  std::vector<double> heights;
+  BoundedVector<double, kMostCorners> heights;
   for (const dvec2& corner : polygon.corners) heights.push_back(corner.y);
   std::sort(heights.begin(), heights.end());
   double area = 0.0;
@@ -92,7 +93,7 @@ PolygonLight make_polygon_light(const Light& light) {
     if (std::fabs(glm::dot(d, polygon.axis_n)) > kTolerance * size) {
       refuse(light, "corner " + std::to_string(i) + " does not lie in the polygon's plane");
     }
-    polygon.corners.emplace_back(glm::dot(d, polygon.axis_u), glm::dot(d, polygon.axis_v));
+    polygon.corners.push_back({glm::dot(d, polygon.axis_u), glm::dot(d, polygon.axis_v)});
   }
   check_convex(light, size, polygon.corners);
   make_slabs(polygon);
@@ -101,7 +102,7 @@ PolygonLight make_polygon_light(const Light& light) {
 
 dvec3 PolygonLight::offset(const dvec2& st) const {
   const double wanted = st.y * (slabs.back().area_before + slabs.back().area);
-  auto slab =
+  const Slab* slab =
       std::find_if(slabs.begin(), slabs.end() - 1, [&](const Slab& s) { return wanted <= s.area_before + s.area; });
   // Share f of the slab's height below which the wanted area lies: width at the bottom w0, at the top w1,
   // f (w0 + f (w1 - w0) / 2) = wanted part of the mean width; the stable root of the quadratic.

@@ -2,13 +2,16 @@
 #pragma once
 
 #include "halfshade/light.h"
+#include "rasterizer/core/bounded_vector.h"
 
 namespace halfshade {
 
 struct PolygonLight {
+  static constexpr std::size_t kMostCorners = 64;
+
   dvec3 center{0.0};                                        // mean of the corners, world
   dvec3 axis_u{1, 0, 0}, axis_v{0, 1, 0}, axis_n{0, 0, 1};  // orthonormal; u along the longest edge, n = facing
-  std::vector<dvec2> corners;                               // around center, in units of axis_u, axis_v
+  BoundedVector<dvec2, kMostCorners> corners;               // around center, in units of axis_u, axis_v
 
   /// A horizontal slice of the polygon between two corners' heights (in axis_v), with its chords.
   struct Slab {
@@ -16,7 +19,7 @@ struct PolygonLight {
     double left_low = 0.0, right_low = 0.0, left_high = 0.0, right_high = 0.0;  // chord ends in axis_u
     double area_before = 0.0, area = 0.0;                                       // of the slabs below, of this one
   };
-  std::vector<Slab> slabs;  // from below
+  BoundedVector<Slab, kMostCorners> slabs;  // from below
 
   /// Vector from `center`, world units. Samples of equal t lie on one chord, so rows stay rows; equal areas of the
   /// square go to equal areas of the polygon.

@@ -1,6 +1,8 @@
 #include "shadows/sample_patterns.h"
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -101,33 +103,35 @@ dvec2 low_discrepancy_sample(std::uint32_t index, std::uint32_t set, std::uint32
 /// Points on the torus, sorted into cells for the question whether one lies nearer than a radius.
 class TorusPoints {
  public:
-  explicit TorusPoints(std::uint32_t count) {
-    while (cells_ * cells_ < count) cells_ *= 2;
-    heads_.assign(std::size_t{cells_} * cells_, kNone);
+  /// For up to `most` points, which are kept in `points`; without memory of its own, since lights that move ask again
+  /// and again.
+  TorusPoints(std::uint32_t most, std::vector<dvec2>& points) : points_(points) {
+    while (cells_ < kMostCells && cells_ * cells_ < most) cells_ *= 2;
+    heads_.fill(kNone);
   }
 
   void add(const dvec2& p) {
     std::uint32_t& head = heads_[cell(p.y) * cells_ + cell(p.x)];
-    next_.push_back(std::exchange(head, static_cast<std::uint32_t>(points.size())));
-    points.push_back(p);
+    next_[points_.size()] = std::exchange(head, static_cast<std::uint32_t>(points_.size()));
+    points_.push_back(p);
   }
 
   bool any_within(const dvec2& p, double radius) const {
     const auto reach = static_cast<std::uint32_t>(radius * cells_) + 1;
     if (2 * reach + 1 >= cells_) {
-      return std::any_of(points.begin(), points.end(), [&](const dvec2& q) { return near(p, q, radius); });
+      return std::any_of(points_.begin(), points_.end(), [&](const dvec2& q) { return near(p, q, radius); });
     }
     for (std::uint32_t y = cell(p.y) + cells_ - reach, y_end = y + 2 * reach; y <= y_end; ++y) {
       for (std::uint32_t x = cell(p.x) + cells_ - reach, x_end = x + 2 * reach; x <= x_end; ++x) {
         for (std::uint32_t i = heads_[y % cells_ * cells_ + x % cells_]; i != kNone; i = next_[i]) {
-          if (near(p, points[i], radius)) return true;
+          if (near(p, points_[i], radius)) return true;
         }
       }
     }
     return false;
   }
 
-  std::vector<dvec2> points;
+  static constexpr std::uint32_t kMostCells = 64, kMostPoints = kMostCells * kMostCells;
 
  private:
   std::uint32_t cell(double x) const { return static_cast<std::uint32_t>(x * cells_); }
@@ -136,21 +140,22 @@ class TorusPoints {
     return glm::dot(torus, torus) < radius * radius;
   }
 
+  std::vector<dvec2>& points_;
   std::uint32_t cells_ = 1;
-  std::vector<std::uint32_t> heads_, next_;  // linked lists per cell
+  std::array<std::uint32_t, kMostPoints> heads_, next_;  // linked lists per cell
 };
 
 /// Dart throwing with a radius that shrinks while it stays unsuccessful (McCool and Fiume 1992): any first part of the
-/// sequence is a Poisson disk pattern by itself.
-std::vector<dvec2> poisson_disk_sequence(std::uint32_t count, std::uint32_t seed) {
-  constexpr std::uint32_t kMost = 4096;  // the cells do not matter for the points, only for the time
+/// sequence is a Poisson disk pattern by itself. Into `result`, which is empty.
+void poisson_disk_sequence(std::uint32_t count, std::uint32_t seed, std::vector<dvec2>& result) {
   constexpr double kShrink = 0.995, kFirst = 0.95;
   constexpr std::uint32_t kPatience = 400;  // darts per radius
-  TorusPoints torus(std::min(count, kMost));
+  assert(count <= TorusPoints::kMostPoints);
+  TorusPoints torus(count, result);
   double factor = kFirst;
   std::uint32_t dart = 0, misses = 0;
-  while (torus.points.size() < count) {
-    const double densest = std::sqrt(1.1547005383792517 / static_cast<double>(torus.points.size() + 1));
+  while (result.size() < count) {
+    const double densest = std::sqrt(1.1547005383792517 / static_cast<double>(result.size() + 1));
     const dvec2 p(hash_unit(dart, hash32(seed, 0x9015501u)), hash_unit(dart, hash32(seed, 0xd15cu)));
     ++dart;
     if (!torus.any_within(p, factor * densest)) {
@@ -160,28 +165,30 @@ std::vector<dvec2> poisson_disk_sequence(std::uint32_t count, std::uint32_t seed
       factor *= kShrink;
     }
   }
-  return torus.points;
 }
 
-std::vector<dvec2> poisson_disk_samples(std::uint32_t count, std::uint32_t first_set, std::uint32_t sets,
-                                        std::uint32_t seed) {
-  const std::vector<dvec2> sequence = poisson_disk_sequence(count, seed);
-  std::vector<dvec2> result;
-  result.reserve(std::size_t{count} * sets);
-  for (std::uint32_t set = first_set; set < first_set + sets; ++set) {
-    for (const dvec2& st : sequence) result.push_back(shifted(st, set));
+/// The sequence lies where the first set will be until all others have been made of it.
+void poisson_disk_samples(std::uint32_t count, std::uint32_t first_set, std::uint32_t sets, std::uint32_t seed,
+                          std::vector<dvec2>& result) {
+  poisson_disk_sequence(count, seed, result);
+  result.resize(std::size_t{count} * sets);
+  for (std::uint32_t set = sets; set-- > 0;) {
+    for (std::uint32_t i = 0; i < count; ++i)
+      result[std::size_t{set} * count + i] = shifted(result[i], first_set + set);
   }
-  return result;
 }
 
 }  // namespace
 
 std::vector<dvec2> unit_square_samples(SamplePattern pattern, std::uint32_t count, std::uint32_t first_set,
                                        std::uint32_t sets, std::uint32_t seed, std::vector<dvec2> reuse) {
-  if (pattern == SamplePattern::kPoissonDisk) return poisson_disk_samples(count, first_set, sets, seed);
   const std::uint32_t rows = row_count(count);
   std::vector<dvec2> result = emptied(reuse);
   result.reserve(std::size_t{count} * sets);
+  if (pattern == SamplePattern::kPoissonDisk) {
+    poisson_disk_samples(count, first_set, sets, seed, result);
+    return result;
+  }
   for (std::uint32_t set = first_set; set < first_set + sets; ++set) {
     for (std::uint32_t i = 0; i < count; ++i) {
       result.push_back(pattern == SamplePattern::kLowDiscrepancy ? low_discrepancy_sample(i, set, seed)

@@ -15,7 +15,7 @@ namespace halfshade {
 ///   poisson-disk               nested. Any two of the first n points, n > 1, lie at least 0.65 sqrt(2 / (sqrt(3) n))
 ///                              apart on the torus: 65 % of what the best possible arrangement reaches (found by
 ///                              measuring seeds 0..59 up to n = 4096; the least was 66.6 %). Sets are shifted copies
-/// `reuse` gives its memory.
+/// `count` is at most 4096. `reuse` gives its memory.
 std::vector<dvec2> unit_square_samples(SamplePattern pattern, std::uint32_t count, std::uint32_t first_set,
                                        std::uint32_t sets, std::uint32_t seed, std::vector<dvec2> reuse = {});
 

@@ -25,7 +25,7 @@ LightSamples make_row_sets(const Light& light, const LocalFrame& frame, const Se
   if (glm::dot(glm::cross(samples.axis_n, along), across) < 0.0) across = -across;  // rows rise along axis_v
   samples.axis_u = unit_vector(along);
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
-  samples.points.clear(), samples.st.clear();
+  samples.points.clear(), samples.st.clear(), samples.st_key = {};
   const std::uint32_t rows = shape.rows * round.count;
   for (std::uint32_t set = 0; set < round.count; ++set) {
     for (std::uint32_t i = 0; i < shape.size(); ++i) {

@@ -1,7 +1,6 @@
 // halfshade accumulate: temporal jitter. Every frame asks with the next set of light samples; the mean converges to the
 // visibility of the whole light (Sintorn, Eisemann, Assarsson 2008, section 4.2 and figure 7).
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <cstdio>
@@ -11,6 +10,7 @@
 #include "halfshade/error.h"
 #include "input_hashes.h"
 #include "progress.h"
+#include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
 #include "shadows/solver.h"
@@ -218,7 +218,7 @@ ordered_json run_json(const Accumulation& run) {
   ordered_json json = {
       {"schema", "halfshade.accumulate/1"}, {"version", HALFSHADE_VERSION}, {"command", o.command_line}};
   json["machine"] = machine_json();
-  json["machine"]["threads"] = tbb::this_task_arena::max_concurrency();
+  json["machine"]["threads"] = concurrency();
   json["scene"] = {
       {"name", o.scene}, {"triangles", run.source.scene.triangles.size()}, {"hash", scene_hash(run.source.scene)}};
   json["method"] = method_json(o);

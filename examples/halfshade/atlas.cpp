@@ -1,7 +1,6 @@
 // halfshade atlas: the scenes that break shadow methods, each method's answer beside the truth, and the number under
 // it.
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "output_files.h"
 #include "pipeline.h"
 #include "progress.h"
+#include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/atomic_file.h"
 #include "rasterizer/io/flip.h"
@@ -253,15 +253,13 @@ int run(const AtlasOptions& options) {
   bool terminator = false;
   const std::vector<AtlasEntry> entries = chosen_entries(options, terminator);
   make_directory(std::filesystem::path(options.output) / "images");
-  ordered_json atlas = {{"schema", kSchema},
-                        {"version", HALFSHADE_VERSION},
-                        {"command", options.command_line},
-                        {"machine", machine_json()},
-                        {"settings",
-                         {{"quick", options.quick},
-                          {"threads", tbb::this_task_arena::max_concurrency()},
-                          {"simd_target", simd_target()}}},
-                        {"entries", ordered_json::array()}};
+  ordered_json atlas = {
+      {"schema", kSchema},
+      {"version", HALFSHADE_VERSION},
+      {"command", options.command_line},
+      {"machine", machine_json()},
+      {"settings", {{"quick", options.quick}, {"threads", concurrency()}, {"simd_target", simd_target()}}},
+      {"entries", ordered_json::array()}};
   Progress progress("atlas", options.quiet);
   const double count = static_cast<double>(entries.size()) + (terminator ? 1.0 : 0.0);
   Stopwatch watch;

@@ -1,7 +1,6 @@
 // halfshade chart: time and error of every method and parameter on any scenes. Each point is measured once with its
 // errors; then all points of a light are timed again in turn, so that whatever slows the machine meets all alike.
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "options_json.h"
 #include "output_files.h"
 #include "progress.h"
+#include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "rasterizer/io/image.h"
 #include "shadows/solver.h"
@@ -57,14 +57,10 @@ std::string program_hash() {
 
 /// What every point of a file has in common; another program means other times.
 ordered_json settings_json(const ChartOptions& o) {
-  return {{"program", program_hash()},
-          {"size", o.size},
-          {"pattern", o.pattern},
-          {"seed", o.seed},
-          {"threads", tbb::this_task_arena::max_concurrency()},
-          {"simd_target", simd_target()},
-          {"time_limit_s", o.time_limit},
-          {"reference_samples", o.reference_samples}};
+  return {{"program", program_hash()},    {"size", o.size},
+          {"pattern", o.pattern},         {"seed", o.seed},
+          {"threads", concurrency()},     {"simd_target", simd_target()},
+          {"time_limit_s", o.time_limit}, {"reference_samples", o.reference_samples}};
 }
 
 ordered_json head_json(const ChartOptions& o) {

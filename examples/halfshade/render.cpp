@@ -264,7 +264,7 @@ ordered_json run_json(const Render& render) {
   const Scene& scene = render.source.scene;
   ordered_json json = {{"schema", "halfshade.stats/1"}, {"version", HALFSHADE_VERSION}, {"command", o.command_line}};
   json["machine"] = machine_json();
-  json["machine"]["threads"] = tbb::this_task_arena::max_concurrency();
+  json["machine"]["threads"] = concurrency();
   json["scene"] = {{"name", o.scene}, {"triangles", scene.triangles.size()}, {"hash", scene_hash(scene)}};
   json["method"] = method_json(o);
   json["size"] = {render.raster.width / render.subsamples, render.raster.height / render.subsamples};

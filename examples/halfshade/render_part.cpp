@@ -52,7 +52,7 @@ LightSamples samples_of_share(const LightSamples& samples, const PartRange& rang
   LightSamples result = samples;
   result.count = static_cast<std::uint32_t>(range.size());
   result.points.clear();
-  result.st.clear();
+  result.st.clear(), result.st_key = {};
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
     for (std::uint64_t i = range.begin; i < range.end; ++i) {
       const std::size_t at = std::size_t{set} * samples.count + i;

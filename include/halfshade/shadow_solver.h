@@ -69,8 +69,8 @@ struct WorkspaceConfig {
 
 /// Scratch memory of one call at a time, and what can be kept between calls. Method `exact` allocates nothing in a call
 /// that follows others with as many receivers, a scene whose meshes are the same, and flat lights of the same shapes
-/// that all have a place here. Meshes may have moved, rectangles and disks too; polygons that move and Poisson disks
-/// allocate. Lists grow to the longest that was needed, so that the first frames of a movement may still allocate.
+/// that all have a place here. Meshes and lights may have moved. Lists grow to the longest that was needed, so that the
+/// first frames of a movement may still allocate.
 /// Lights that are not flat, receivers in the plane of a light, and other methods allocate as they need.
 /// Distinct Workspaces may be used concurrently; one Workspace may not: a call that finds it in use throws
 /// Error{kUsage}.

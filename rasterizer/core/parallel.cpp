@@ -1,8 +1,43 @@
 #include "rasterizer/core/parallel.h"
 
+#include <atomic>
+#include <exception>
 #include <mutex>
+#include <string>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
 
 namespace halfshade {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+
+Executor current_executor(const Run* run) { return run != nullptr ? run->execution().executor : Executor::kArena; }
+
+/// What every piece of work runs in.
+class TaskScope {
+ public:
+  explicit TaskScope(Run* run) : run_(run) {
+    if (run != nullptr && run->watched()) run->check();
+  }
+
+ private:
+  RunScope run_;
+  FpEnvironment environment_;
+};
+
+/// TBB loops are not stopped by what happens to loops of the host around them: a call returns with all of its work done
+/// or throws.
+template <class Loop>
+void in_own_context(const Loop& loop) {
+  tbb::task_group_context context(tbb::task_group_context::isolated);
+  loop(context);
+}
+
+}  // namespace
 
 std::size_t concurrency() {
   const Run* run = current_run();
@@ -39,8 +74,8 @@ struct GuardedLoop {
   }
 };
 
-}  // namespace
-
+/// body(i) for i in [0, count) in the host's loop. An exception of a body is thrown again here, once the loop is over.
+/// Throws Error{kUsage} where the host left some out.
 void host_loop(Run& run, std::size_t count, TaskBody body) {
   GuardedLoop loop{body, {}, {}, {}, {}};
   const auto call = [](const void* context, std::size_t i) {
@@ -54,6 +89,71 @@ void host_loop(Run& run, std::size_t count, TaskBody body) {
   if (loop.called.load() == count) return;
   throw Error(ErrorCode::kUsage, "execution: parallel_for called " + std::to_string(loop.called.load()) + " of " +
                                      std::to_string(count) + " bodies");
+}
+
+}  // namespace
+
+void parallel_tasks(std::size_t count, FunctionRef<void(std::size_t)> body) {
+  Run* const run = current_run();
+  const auto task = [&](std::size_t i) {
+    const TaskScope scope(run);
+    body(i);
+  };
+  if (count <= 1 || current_executor(run) == Executor::kSerial) {
+    for (std::size_t i = 0; i != count; ++i) task(i);
+  } else if (current_executor(run) == Executor::kHost) {
+    const auto call = [](const void* context, std::size_t i) { (*static_cast<const decltype(task)*>(context))(i); };
+    host_loop(*run, count, TaskBody(call, &task));
+  } else {
+    in_own_context([&](tbb::task_group_context& context) {
+      tbb::parallel_for(
+          Range(0, count, 1),
+          [&](const Range& range) {
+            for (std::size_t i = range.begin(); i != range.end(); ++i) task(i);
+          },
+          tbb::simple_partitioner(), context);
+    });
+  }
+}
+
+void parallel_ranges(std::size_t count, std::size_t grain, FunctionRef<void(std::size_t, std::size_t)> body) {
+  Run* const run = current_run();
+  // Where somebody may stop the call, long pieces are cut into short ones.
+  const auto piece = [&](std::size_t begin, std::size_t end) {
+    const std::size_t step = run != nullptr && run->watched() ? grain : end - begin;
+    for (; begin < end; begin += std::min(step, end - begin)) {
+      const TaskScope scope(run);
+      body(begin, begin + std::min(step, end - begin));
+    }
+  };
+  if (count <= grain || current_executor(run) == Executor::kSerial) {
+    piece(0, count);
+  } else if (current_executor(run) == Executor::kHost) {
+    const std::size_t pieces = std::min((count + grain - 1) / grain, 4 * concurrency());
+    parallel_tasks(pieces, [&](std::size_t i) { piece(count * i / pieces, count * (i + 1) / pieces); });
+  } else {
+    in_own_context([&](tbb::task_group_context& context) {
+      tbb::parallel_for(
+          Range(0, count, grain), [&](const Range& range) { piece(range.begin(), range.end()); },
+          tbb::auto_partitioner(), context);
+    });
+  }
+}
+
+void parallel_pair(FunctionRef<void()> first, FunctionRef<void()> second) {
+  Run* const run = current_run();
+  if (current_executor(run) != Executor::kArena) {
+    parallel_tasks(2, [&](std::size_t i) { i == 0 ? first() : second(); });
+    return;
+  }
+  const auto guarded = [run](FunctionRef<void()> body) {
+    return [body, run] {
+      const TaskScope scope(run);
+      body();
+    };
+  };
+  in_own_context(
+      [&](tbb::task_group_context& context) { tbb::parallel_invoke(guarded(first), guarded(second), context); });
 }
 
 void exclusive_scan(const std::vector<std::uint32_t>& counts, std::vector<std::uint32_t>& offsets) {
@@ -71,6 +171,22 @@ void exclusive_scan(const std::vector<std::uint32_t>& counts, std::vector<std::u
     if (block == 0) return;
     for (std::size_t i = block * kBlock; i + 1 < end_of(block); ++i) offsets[i + 1] += offsets[block * kBlock];
   });
+}
+
+void run_call(const Execution& execution, FunctionRef<void()> body) {
+  const FpEnvironment environment;
+  Run run(execution);
+  const RunScope scope(&run);
+  try {
+    if (execution.executor == Executor::kArena) {
+      tbb::this_task_arena::isolate([&] { body(); });
+    } else {
+      body();
+    }
+  } catch (...) {
+    if (run.host_exception()) std::rethrow_exception(run.host_exception());
+    throw;
+  }
 }
 
 }  // namespace halfshade

@@ -1,20 +1,18 @@
 // All threading goes through here: loops that run in the TBB arena of the calling thread, on that thread alone, or in
 // the host's own loop, as the current call says (run.h). Every piece of work gets the floating-point environment that
 // bit-exact results need, and is a place where the call can be stopped.
+//
+// The loops are functions, not templates, so that TBB's headers are compiled in parallel.cpp alone: they take longer
+// than most of our sources, and a piece of work is much longer than the call of a function.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <vector>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
-
 #include "rasterizer/core/fp_environment.h"
+#include "rasterizer/core/function_ref.h"
 #include "rasterizer/core/run.h"
 
 namespace halfshade {
@@ -22,103 +20,14 @@ namespace halfshade {
 /// About how many threads work for the current call.
 std::size_t concurrency();
 
-/// body(i) for i in [0, count) in the host's loop. An exception of a body is thrown again here, once the loop is over.
-/// Throws Error{kUsage} where the host left some out.
-void host_loop(Run& run, std::size_t count, TaskBody body);
-
-/// What every piece of work runs in.
-class TaskScope {
- public:
-  explicit TaskScope(Run* run) : run_(run) {
-    if (run != nullptr && run->watched()) run->check();
-  }
-
- private:
-  RunScope run_;
-  FpEnvironment environment_;
-};
-
-/// TBB loops are not stopped by what happens to loops of the host around them: a call returns with all of its work done
-/// or throws.
-template <class Loop>
-void in_own_context(const Loop& loop) {
-  tbb::task_group_context context(tbb::task_group_context::isolated);
-  loop(context);
-}
-
-inline Executor current_executor(const Run* run) {
-  return run != nullptr ? run->execution().executor : Executor::kArena;
-}
-
 /// body(i) for every i in [0, count), each its own task: for pieces of work that are large and uneven.
-template <class Body>
-void parallel_tasks(std::size_t count, const Body& body) {
-  Run* const run = current_run();
-  const auto task = [&](std::size_t i) {
-    const TaskScope scope(run);
-    body(i);
-  };
-  if (count <= 1 || current_executor(run) == Executor::kSerial) {
-    for (std::size_t i = 0; i != count; ++i) task(i);
-  } else if (current_executor(run) == Executor::kHost) {
-    const auto call = [](const void* context, std::size_t i) { (*static_cast<const decltype(task)*>(context))(i); };
-    host_loop(*run, count, TaskBody(call, &task));
-  } else {
-    in_own_context([&](tbb::task_group_context& context) {
-      tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, count, 1),
-          [&](const tbb::blocked_range<std::size_t>& range) {
-            for (std::size_t i = range.begin(); i != range.end(); ++i) task(i);
-          },
-          tbb::simple_partitioner(), context);
-    });
-  }
-}
+void parallel_tasks(std::size_t count, FunctionRef<void(std::size_t)> body);
 
 /// body(begin, end) over pieces of [0, count) of at least `grain` items (except the last).
-template <class Body>
-void parallel_ranges(std::size_t count, std::size_t grain, const Body& body) {
-  Run* const run = current_run();
-  // Where somebody may stop the call, long pieces are cut into short ones.
-  const auto piece = [&](std::size_t begin, std::size_t end) {
-    const std::size_t step = run != nullptr && run->watched() ? grain : end - begin;
-    for (; begin < end; begin += std::min(step, end - begin)) {
-      const TaskScope scope(run);
-      body(begin, begin + std::min(step, end - begin));
-    }
-  };
-  if (count <= grain || current_executor(run) == Executor::kSerial) {
-    piece(0, count);
-  } else if (current_executor(run) == Executor::kHost) {
-    const std::size_t pieces = std::min((count + grain - 1) / grain, 4 * concurrency());
-    parallel_tasks(pieces, [&](std::size_t i) { piece(count * i / pieces, count * (i + 1) / pieces); });
-  } else {
-    in_own_context([&](tbb::task_group_context& context) {
-      tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, count, grain),
-          [&](const tbb::blocked_range<std::size_t>& range) { piece(range.begin(), range.end()); },
-          tbb::auto_partitioner(), context);
-    });
-  }
-}
+void parallel_ranges(std::size_t count, std::size_t grain, FunctionRef<void(std::size_t, std::size_t)> body);
 
 /// Both at once, for recursion.
-template <class First, class Second>
-void parallel_pair(const First& first, const Second& second) {
-  Run* const run = current_run();
-  if (current_executor(run) != Executor::kArena) {
-    parallel_tasks(2, [&](std::size_t i) { i == 0 ? first() : second(); });
-    return;
-  }
-  const auto guarded = [run](const auto& body) {
-    return [&body, run] {
-      const TaskScope scope(run);
-      body();
-    };
-  };
-  in_own_context(
-      [&](tbb::task_group_context& context) { tbb::parallel_invoke(guarded(first), guarded(second), context); });
-}
+void parallel_pair(FunctionRef<void()> first, FunctionRef<void()> second);
 
 /// Sorts by a strict order that has no ties (equal results for any number of threads). `scratch` is resized to match.
 template <class T, class Before>
@@ -169,21 +78,6 @@ void exclusive_scan(const std::vector<std::uint32_t>& counts, std::vector<std::u
 /// One call of the library: body() in the executor that `execution` asks for, watched by its progress callback.
 /// In TBB, threads that wait within the call take up no other work of the arena, so that neither the host's own loops
 /// can end up inside of it nor the callback be late.
-template <class Body>
-void run_call(const Execution& execution, const Body& body) {
-  const FpEnvironment environment;
-  Run run(execution);
-  const RunScope scope(&run);
-  try {
-    if (execution.executor == Executor::kArena) {
-      tbb::this_task_arena::isolate(body);
-    } else {
-      body();
-    }
-  } catch (...) {
-    if (run.host_exception()) std::rethrow_exception(run.host_exception());
-    throw;
-  }
-}
+void run_call(const Execution& execution, FunctionRef<void()> body);
 
 }  // namespace halfshade

@@ -24,7 +24,7 @@ void solve_raytrace(const LatticeMesh& mesh, const ReceiverArray& receivers, con
   Stopwatch watch;
   masks.reset(receivers.size(), samples.count);
   const EmbreeMode mode = best_embree_mode(samples.count, config.raytrace.robust);
-  EmbreeRays embree(opaque.get(), receivers, samples, tbb::this_task_arena::max_concurrency());
+  EmbreeRays embree(opaque.get(), receivers, samples, static_cast<int>(concurrency()));
   embree.build_ms(mode);
   stats.build_ms = watch.lap();
   constexpr std::size_t kRound = 16384;

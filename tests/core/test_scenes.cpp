@@ -6,6 +6,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include <tbb/task_arena.h>
+
 #include <glm/vector_relational.hpp>
 
 #include "halfshade/error.h"

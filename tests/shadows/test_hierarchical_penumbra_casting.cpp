@@ -2,6 +2,8 @@
 
 #include <numeric>
 
+#include <tbb/task_arena.h>
+
 #include "halfshade/stream.h"
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/predicate.h"

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <tbb/task_arena.h>
+
 #include "rasterizer/scenes/builtin.h"
 #include "shadows/light_maps.h"
 #include "support/lit_picture.h"

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include <tbb/task_arena.h>
+
 #include "halfshade/emission.h"
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/srgb_table.h"
