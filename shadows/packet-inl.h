@@ -18,6 +18,17 @@ using IntTag = hn::RebindToSigned<Tag>;
 using UintVec = hn::Vec<UintTag>;
 constexpr std::size_t kMaxLines = SampleRows::kMaxLines;
 
+/// 1 / a within 4 units of 2^-24.
+HWY_INLINE Vec Reciprocal(Vec a) {
+  const Tag d;
+#if HWY_ARCH_X86
+  const Vec r = hn::ApproximateReciprocal(a);
+  return hn::Mul(r, hn::NegMulAdd(a, r, hn::Set(d, 2.0f)));
+#else
+  return hn::Div(hn::Set(d, 1.0f), a);
+#endif
+}
+
 /// Receivers as boxes.
 struct ReceiverBox {
   vec3 low{1e30f}, high{-1e30f};  // lattice
@@ -37,7 +48,7 @@ struct Packet : ReceiverBox {
   std::size_t first = 0, count = 0;
   Vec3 position, to_center;       // lattice; from there to the light's centre
   Vec distance;                   // bound on |coordinate| of receiver to sample
-  Vec height_error, place_error;  // 5 |r - c| / height + 10; 5 |r - c|: see ProjectVertices
+  Vec height_error, place_error;  // 5 |r - c| / height + 14; 5 |r - c|: see ProjectVertices
   Vec column, row, height;        // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                    // own triangle
   const PictureLines* lines;      // where the rows lie
@@ -265,10 +276,11 @@ class VertexProjection {
   HWY_INLINE void Project(const vec3& vertex, std::size_t slot, ProjectedVertices& projected) const {
     const Tag d;
     const Vec3 way = Subtract(Splat(vertex), packet_.position);
-    const Vec inverse = hn::Div(hn::Set(d, 1.0f), Dot(way, down_)), scale = hn::Mul(packet_.height, inverse);
+    const Vec inverse = Reciprocal(Dot(way, down_)), scale = hn::Mul(packet_.height, inverse);
     hn::Store(hn::MulAdd(Dot(way, axis_x_), scale, packet_.column), d, projected.column[slot]);
     hn::Store(hn::MulAdd(Dot(way, axis_y_), scale, packet_.row), d, projected.row[slot]);
-    // In units of 2^-24: a coordinate along an axis is within 5 |way|, the depth as well, the height within 5 |r - c|.
+    // In units of 2^-24: a coordinate along an axis is within 5 |way|, the depth as well, the height within 5 |r - c|,
+    // the reciprocal within 4.
     const Vec length = Norm1(way);
     const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 5.0f), length), inverse, packet_.height_error);
     hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet_.place_error)), d,

@@ -28,17 +28,6 @@ struct HalfPlane {
   LaneMask up;
 };
 
-/// 1 / a within 4 units of 2^-24.
-HWY_INLINE Vec Reciprocal(Vec a) {
-  const Tag d;
-#if HWY_ARCH_X86
-  const Vec r = hn::ApproximateReciprocal(a);
-  return hn::Mul(r, hn::NegMulAdd(a, r, hn::Set(d, 2.0f)));
-#else
-  return hn::Div(hn::Set(d, 1.0f), a);
-#endif
-}
-
 /// a x + b y + c >= 0 in units of length, certain beyond `error`.
 HWY_INLINE HalfPlane SolveForX(const SampleRows& rows, Vec a, Vec b, Vec c, Vec error) {
   const Tag d;
@@ -226,7 +215,7 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   packet_.row = Dot(from_center, Splat(rows_.axis_y * rows_.row_scale));
   packet_.height = Dot(from_center, Splat(vec3(scene_.frame.n)));
   packet_.place_error = hn::Mul(hn::Set(d, 5.0f), Norm1(from_center));
-  packet_.height_error = hn::Add(hn::Div(packet_.place_error, packet_.height), hn::Set(d, 10.0f));
+  packet_.height_error = hn::Add(hn::Div(packet_.place_error, packet_.height), hn::Set(d, 14.0f));
   packet_.distance =
       hn::Add(NormMax(packet_.to_center), hn::Set(d, scene_.samples->reach + rows_.deviation / kDeterminantError));
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));

@@ -310,7 +310,9 @@ HWY_INLINE void GroupOutline::Set() {
     const std::size_t a = edges_.from[e], b = edges_.to[e];
     const Vec xa = hn::Load(d, vertices_.column[a]), ya = hn::Load(d, vertices_.row[a]),
               dx = hn::Sub(hn::Load(d, vertices_.column[b]), xa), dy = hn::Sub(hn::Load(d, vertices_.row[b]), ya);
-    const Vec slope = hn::Div(dx, hn::IfThenElse(hn::Eq(dy, hn::Zero(d)), hn::Set(d, 1.0f), dy));
+    // Where so small a difference crosses a row, both ends lie near it.
+    const Vec slope =
+        hn::Mul(dx, Reciprocal(hn::IfThenElse(hn::Lt(hn::Abs(dy), hn::Set(d, 1e-6f)), hn::Set(d, 1.0f), dy)));
     const Vec error =
         hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])), hn::Set(d, rows_.deviation));
     Vec width = hn::Mul(error, hn::MulAdd(hn::Abs(slope), row_scale, hn::Set(d, rows_.scale)));
@@ -350,16 +352,14 @@ HWY_INLINE UintVec GroupOutline::SamplesNearEnds(std::size_t e, Vec y, Vec offse
 template <int kBits>
 struct WindingNumbers {
   UintVec bit[kBits];
-  HWY_INLINE void Add(UintVec one) {
-    for (UintVec& b : bit) {
-      const UintVec carry = hn::And(b, one);
-      b = hn::Xor(b, one), one = carry;
-    }
-  }
-  HWY_INLINE void Subtract(UintVec one) {
-    for (UintVec& b : bit) {
-      const UintVec borrow = hn::AndNot(b, one);
-      b = hn::Xor(b, one), one = borrow;
+  /// One more, or less where `minus` is set as well: -1 has all bits set.
+  HWY_INLINE void Add(UintVec one, UintVec minus) {
+    UintVec carry = hn::And(bit[0], one);
+    bit[0] = hn::Xor(bit[0], one);
+    for (int i = 1; i < kBits; ++i) {
+      const UintVec b = bit[i];
+      bit[i] = hn::Xor(b, hn::Xor(minus, carry));
+      carry = hn::Or(hn::And(b, minus), hn::And(carry, hn::Or(b, minus)));
     }
   }
   HWY_INLINE UintVec Any() const {
@@ -454,8 +454,8 @@ HWY_INLINE UintVec GroupOutline::WindAround(std::uint32_t line, hn::Vec<IntTag> 
 #endif
       LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
       if (e >= edges_.fixed) Turn(e, down, up);
-      if (!hn::AllFalse(d, down)) winding.Add(hn::IfThenElseZero(hn::RebindMask(du, down), beyond));
-      if (!hn::AllFalse(d, up)) winding.Subtract(hn::IfThenElseZero(hn::RebindMask(du, up), beyond));
+      winding.Add(hn::IfThenElseZero(hn::RebindMask(du, hn::Or(down, up)), beyond),
+                  hn::IfThenElseZero(hn::RebindMask(du, up), beyond));
     }
   }
   return winding.Any();
