@@ -255,7 +255,8 @@ TEST_CASE("every round, whichever way its rows run, sees what a light of its sam
     const LatticeMesh mesh = make_lattice_mesh(scene, frame);
     const ReceiverRequest q = make_receiver_request(frame, receivers, light, {});
     ShadowStats stats;
-    LevelEngine engine(mesh, q.receivers, light, {}, stats);
+    const ShadowConfig config;
+    LevelEngine engine(mesh, q.receivers, light, config, stats);
     REQUIRE(engine.uses_rows());
     for (const SetRound& round : kSetRounds) {
       CAPTURE(round.index);

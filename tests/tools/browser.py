@@ -26,15 +26,19 @@ def look(page, actions):
               '})().catch(e => { document.body.dataset.seen = JSON.stringify({errors: [String(e)]}); });\n</script>')
     acted = page.with_name("acted-" + page.name)
     acted.write_text(page.read_text(encoding="utf-8").replace("</body>", script + "</body>"), encoding="utf-8")
-    with tempfile.TemporaryDirectory(prefix="halfshade-browser-", ignore_cleanup_errors=True) as profile:
-        result = subprocess.run(
-            [program(), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
-             "--enable-logging=stderr", "--virtual-time-budget=30000", "--dump-dom", acted.as_uri()],
-            capture_output=True, text=True, timeout=300, check=False)
-    console = [line for line in result.stderr.splitlines() if "CONSOLE" in line]
-    if console:
-        raise AssertionError("the console says: " + "\n".join(console))
-    match = re.search(r'data-seen="([^"]*)"', result.stdout)
+    match = None
+    for budget in (30000, 120000, 600000):  # virtual milliseconds, which on a busy machine pass before pictures are decoded
+        with tempfile.TemporaryDirectory(prefix="halfshade-browser-", ignore_cleanup_errors=True) as profile:
+            result = subprocess.run(
+                [program(), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
+                 "--enable-logging=stderr", f"--virtual-time-budget={budget}", "--dump-dom", acted.as_uri()],
+                capture_output=True, text=True, timeout=300, check=False)
+        console = [line for line in result.stderr.splitlines() if "CONSOLE" in line]
+        if console:
+            raise AssertionError("the console says: " + "\n".join(console))
+        match = re.search(r'data-seen="([^"]*)"', result.stdout)
+        if match is not None:
+            break
     if match is None:
         raise AssertionError("the page's script did not finish")
     return json.loads(match.group(1).replace("&quot;", '"').replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
