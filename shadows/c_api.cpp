@@ -160,14 +160,17 @@ Execution to_execution(const halfshade_context_desc* given) {
   return execution;
 }
 
+bool is_empty(const ReceiverView& receivers) { return receivers.positions.count == 0; }
+bool is_empty(const GBuffer& gbuffer) { return gbuffer.width == 0 || gbuffer.height == 0; }
+
 template <class Receivers>
 void solve(halfshade_context* context, const halfshade_solver* solver, const halfshade_scene* scene,
            halfshade_workspace* workspace, const Receivers& receivers, const halfshade_light* lights,
            std::size_t light_count, const halfshade_output* output) {
   halfshade_workspace& work = checked(workspace);
   to_lights(lights, light_count, work.lights);
-  checked(solver).value.solve(checked(scene).value, receivers, work.lights, work.value, to_output(output),
-                              context->execution);
+  checked(solver).value.solve(checked(scene).value, receivers, work.lights, work.value,
+                              to_output(output, !is_empty(receivers) && light_count != 0), context->execution);
 }
 
 }  // namespace

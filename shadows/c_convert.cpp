@@ -153,8 +153,15 @@ ReceiverView to_view(const halfshade_receivers* given) {
   return view;
 }
 
-ShadowOutput to_output(const halfshade_output* given) {
+ShadowOutput to_output(const halfshade_output* given, bool any) {
   const halfshade_output desc = read_struct(given, "output");
+  const auto check = [any](const void* data, std::size_t count, const char* name) {
+    if (any && data != nullptr && count == 0) usage(std::string(name) + " has 0 elements; NULL stands for not wanted");
+  };
+  check(desc.masks, desc.mask_count, "output.masks");
+  check(desc.visibility, desc.visibility_count, "output.visibility");
+  check(desc.irradiance, desc.irradiance_count, "output.irradiance");
+  check(desc.total_irradiance, desc.total_irradiance_count, "output.total_irradiance");
   return {.masks = to_span(desc.masks, desc.mask_count, "output.masks"),
           .visibility = to_span(desc.visibility, desc.visibility_count, "output.visibility"),
           .irradiance = to_colors(desc.irradiance, desc.irradiance_count, "output.irradiance"),

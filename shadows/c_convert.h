@@ -67,7 +67,8 @@ UvView to_view(const halfshade_uvs& uvs, const std::string& name);
 AlphaView to_view(const halfshade_alpha_desc* given);
 MeshView to_view(const halfshade_mesh_desc* given);
 ReceiverView to_view(const halfshade_receivers* given);
-ShadowOutput to_output(const halfshade_output* given);
+/// `any`: there are receivers and lights, so that an array without elements is too short.
+ShadowOutput to_output(const halfshade_output* given, bool any);
 
 /// 12 values, row by row.
 Transform to_transform(const double* rows);

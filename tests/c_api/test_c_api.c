@@ -271,6 +271,9 @@ static void pictures(void) {
   f.output.mask_count = 0;
   CHECK_OK(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output));
   CHECK(picture[12 * 32 + 2] < 0.1f && picture[12 * 32 + 29] > 0.9f); /* shadow on the left */
+  f.output.visibility_count = 0;                                      /* of an array that is wanted */
+  CHECK_FAILS(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output),
+              HALFSHADE_ERROR_USAGE, "visibility");
   f.output.visibility_count = 5;
   CHECK_FAILS(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output),
               HALFSHADE_ERROR_USAGE, "visibility");
