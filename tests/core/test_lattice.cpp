@@ -7,6 +7,7 @@
 #include <limits>
 
 #include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include "halfshade/error.h"
 #include "rasterizer/core/hash.h"
