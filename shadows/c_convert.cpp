@@ -32,9 +32,16 @@ std::span<Value> to_span(Value* data, std::size_t count, const std::string& name
   return {data, data == nullptr ? 0 : count};
 }
 
-/// Colours in an array of floats.
-std::span<vec3> to_colors(float* data, std::size_t count, const std::string& name) {
-  to_span(data, count, name);
+/// An output: none when NULL; `any` of its elements are needed.
+template <class Value>
+std::span<Value> to_output_span(Value* data, std::size_t count, bool any, const std::string& name) {
+  if (any && data != nullptr && count == 0) usage(name + " has 0 elements; NULL stands for not wanted");
+  return to_span(data, count, name);
+}
+
+/// The same for colours in an array of floats.
+std::span<vec3> to_output_colors(float* data, std::size_t count, bool any, const std::string& name) {
+  to_output_span(data, count, any, name);
   if (count % 3 != 0) usage(name + " holds " + std::to_string(count) + " floats, which is no multiple of 3");
   return {reinterpret_cast<vec3*>(data), data == nullptr ? 0 : count / 3};
 }
@@ -155,17 +162,11 @@ ReceiverView to_view(const halfshade_receivers* given) {
 
 ShadowOutput to_output(const halfshade_output* given, bool any) {
   const halfshade_output desc = read_struct(given, "output");
-  const auto check = [any](const void* data, std::size_t count, const char* name) {
-    if (any && data != nullptr && count == 0) usage(std::string(name) + " has 0 elements; NULL stands for not wanted");
-  };
-  check(desc.masks, desc.mask_count, "output.masks");
-  check(desc.visibility, desc.visibility_count, "output.visibility");
-  check(desc.irradiance, desc.irradiance_count, "output.irradiance");
-  check(desc.total_irradiance, desc.total_irradiance_count, "output.total_irradiance");
-  return {.masks = to_span(desc.masks, desc.mask_count, "output.masks"),
-          .visibility = to_span(desc.visibility, desc.visibility_count, "output.visibility"),
-          .irradiance = to_colors(desc.irradiance, desc.irradiance_count, "output.irradiance"),
-          .total_irradiance = to_colors(desc.total_irradiance, desc.total_irradiance_count, "output.total_irradiance")};
+  return {.masks = to_output_span(desc.masks, desc.mask_count, any, "output.masks"),
+          .visibility = to_output_span(desc.visibility, desc.visibility_count, any, "output.visibility"),
+          .irradiance = to_output_colors(desc.irradiance, desc.irradiance_count, any, "output.irradiance"),
+          .total_irradiance =
+              to_output_colors(desc.total_irradiance, desc.total_irradiance_count, any, "output.total_irradiance")};
 }
 
 Transform to_transform(const double* rows) {

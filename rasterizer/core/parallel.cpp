@@ -55,7 +55,7 @@ namespace {
 
 /// Keeps exceptions out of the host's loop, and counts what was called.
 struct GuardedLoop {
-  TaskBody body;
+  FunctionRef<void(std::size_t)> body;
   std::atomic<std::size_t> called{0};
   std::atomic<bool> failed{false};
   std::mutex mutex;
@@ -76,7 +76,7 @@ struct GuardedLoop {
 
 /// body(i) for i in [0, count) in the host's loop. An exception of a body is thrown again here, once the loop is over.
 /// Throws Error{kUsage} where the host left some out.
-void host_loop(Run& run, std::size_t count, TaskBody body) {
+void host_loop(Run& run, std::size_t count, FunctionRef<void(std::size_t)> body) {
   GuardedLoop loop{body, {}, {}, {}, {}};
   const auto call = [](const void* context, std::size_t i) {
     static_cast<GuardedLoop*>(const_cast<void*>(context))->call(i);  // `loop` below, which is not const
@@ -102,8 +102,7 @@ void parallel_tasks(std::size_t count, FunctionRef<void(std::size_t)> body) {
   if (count <= 1 || current_executor(run) == Executor::kSerial) {
     for (std::size_t i = 0; i != count; ++i) task(i);
   } else if (current_executor(run) == Executor::kHost) {
-    const auto call = [](const void* context, std::size_t i) { (*static_cast<const decltype(task)*>(context))(i); };
-    host_loop(*run, count, TaskBody(call, &task));
+    host_loop(*run, count, task);
   } else {
     in_own_context([&](tbb::task_group_context& context) {
       tbb::parallel_for(
