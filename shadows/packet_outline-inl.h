@@ -197,9 +197,13 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
   const LightFrame& frame = scene_.frame;
   const vec3 middle = 0.5f * (packet_.low + packet_.high);
   const vec3 in_frame(frame.to_frame(dvec3(middle)));
-  float half[3];
-  for (int k = 0; k < 3; ++k)
-    half[k] = std::max(packet_.shaft.high[k] - in_frame[k], in_frame[k] - packet_.shaft.low[k]) + 1e-6f;
+  // How far the receivers reach to either side of `middle`. Not the larger of both for either side: vertices of the
+  // patch lie below all receivers of the cluster, but not below more.
+  float before[3], beyond[3];
+  for (int k = 0; k < 3; ++k) {
+    before[k] = in_frame[k] - packet_.shaft.low[k] + 1e-6f;
+    beyond[k] = packet_.shaft.high[k] - in_frame[k] + 1e-6f;
+  }
   const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
   const NetEdges& net = scratch_.net_edges;
   const VertexProjection projection(scene_, packet_);
@@ -219,11 +223,11 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
     for (const auto& v : net.end) {
       const Vec3 c = Subtract({hn::LoadU(d, &v[0][e]), hn::LoadU(d, &v[1][e]), hn::LoadU(d, &v[2][e])}, Splat(middle));
       const Vec up = Dot(c, normal), z = hn::Add(up, hn::Set(d, in_frame.z));
-      const Vec w0 = hn::Div(z, hn::Sub(hn::Neg(up), hn::Set(d, half[2]))),
-                w1 = hn::Div(z, hn::Sub(hn::Set(d, half[2]), up));
+      const Vec w0 = hn::Div(z, hn::Sub(hn::Neg(up), hn::Set(d, before[2]))),
+                w1 = hn::Div(z, hn::Sub(hn::Set(d, beyond[2]), up));
       for (int axis = 0; axis < 2; ++axis) {
         const Vec away = Dot(c, axes[axis]), place = hn::Add(away, hn::Set(d, in_frame[axis]));
-        const Vec a = hn::Sub(away, hn::Set(d, half[axis])), b = hn::Add(away, hn::Set(d, half[axis]));
+        const Vec a = hn::Sub(away, hn::Set(d, beyond[axis])), b = hn::Add(away, hn::Set(d, before[axis]));
         const Vec a0 = hn::Mul(a, w0), a1 = hn::Mul(a, w1), b0 = hn::Mul(b, w0), b1 = hn::Mul(b, w1);
         low[axis] = hn::Min(low[axis], hn::Add(place, hn::Min(hn::Min(a0, a1), hn::Min(b0, b1))));
         high[axis] = hn::Max(high[axis], hn::Add(place, hn::Max(hn::Max(a0, a1), hn::Max(b0, b1))));
