@@ -21,6 +21,15 @@ bool settled(std::span<const EdgeUse> edge, const LightFacing& facing) {
                                    [&](const EdgeUse& use) { return facing.of_triangle[use.triangle] == first; });
 }
 
+/// The own triangle of receiver `i` if it is one of a closed component and shows its back; else kNone.
+std::uint32_t own_from_behind(const LatticeMesh& mesh, const KernelSamples& samples, const KernelReceivers& receivers,
+                              std::size_t i) {
+  const std::uint32_t own = receivers.own[i];
+  if (own == kNone || samples.closed->of_triangle[own] == kNone) return kNone;
+  const auto [a, b, c] = mesh.corners(own);
+  return orient3d(a, b, c, {receivers.x[i], receivers.y[i], receivers.z[i]}) > 0 ? own : kNone;
+}
+
 }  // namespace
 
 LightFacing find_facing(const LatticeMesh& mesh, const KernelSamples& samples) {
@@ -102,15 +111,17 @@ void test_one_sample(const LatticeMesh& mesh, const KernelSamples& samples, cons
   for (const BlockerSpan& span : spans) {
     const auto [a, b, c] = mesh.corners(span.triangle);
     const bool from_front = orient3d(a, b, c, sample) > 0;  // the sample is behind the plane, a hidden receiver before
+    const std::uint32_t component = samples.closed->of_triangle[span.triangle];
     counters.pairs_tested += span.end - span.begin;
     for (std::uint32_t i = span.begin; i < span.end; ++i) {
       if (settled.hidden[i] != 0) continue;
       if (!blocks(a, b, c, {receivers.x[i], receivers.y[i], receivers.z[i]}, sample)) continue;
       if (from_front) {
-        settled.from_front[block].emplace_back(samples.closed->of_triangle[span.triangle], i);
-      } else if (receivers.own[i] != span.triangle) {
-        settled.hidden[i] = 1;
+        settled.from_front[block].emplace_back(component, i);
+        continue;
       }
+      const std::uint32_t own = own_from_behind(mesh, samples, receivers, i);
+      if (own == kNone || samples.closed->of_triangle[own] != component) settled.hidden[i] = 1;
     }
   }
 }
@@ -128,10 +139,10 @@ void mark_undecided(const LatticeMesh& mesh, const KernelSamples& samples, const
     }
   }
   for (std::size_t i = 0; i < tile_of.size(); ++i) {
-    const std::uint32_t own = receivers.own[i], component = own == kNone ? kNone : samples.closed->of_triangle[own];
-    if (!stencils.has(component)) continue;
-    const auto [a, b, c] = mesh.corners(own);
-    if (orient3d(a, b, c, {receivers.x[i], receivers.y[i], receivers.z[i]}) > 0) stencils.mark(component, tile_of[i]);
+    const std::uint32_t own = own_from_behind(mesh, samples, receivers, i);
+    if (own == kNone) continue;
+    const std::uint32_t component = samples.closed->of_triangle[own];
+    if (stencils.has(component)) stencils.mark(component, tile_of[i]);
   }
 }
 

@@ -180,6 +180,23 @@ TEST_CASE("one sample settles more than half of the umbra of a ball under a smal
   CHECK(on.detail("afsm.silhouette_edges").value() < 0.2 * on.detail("afsm.edges_of_closed_meshes").value());
 }
 
+TEST_CASE("receivers just below their own triangle of a closed ball: what that triangle alone hides does not count") {
+  // Once, where another triangle of the ball hid the first sample, all samples were taken for hidden.
+  const std::vector<Triangle> triangles = ball({0.5, 1.0, 0.0}, 1.2, 9, 16);
+  std::vector<Receiver> receivers;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const auto& [a, b, c] = triangles[t];
+    for (const double depth : {1e-6, 1e-3, 0.05}) {
+      receivers.push_back({(a + b + c) / 3.0 - depth * glm::normalize(glm::cross(b - a, c - a)), t});
+    }
+  }
+  Light light = frame_light();
+  light.u *= 3.0, light.v *= 3.0;
+  for (const std::uint32_t samples : {16u, 256u}) {
+    CHECK(wrong_bits_of_exact_methods(scene_of(triangles), receivers, light, frame_config(samples)) == 0);
+  }
+}
+
 TEST_CASE("cuts and culling leave fewer pairs, and tighter outlines fewer cells") {
   Random random(12);
   const Scene scene = scene_of(joined(ball({0, 2, 0}, 1.0, 16, 24), loose_triangles(random, 60, 0.5)));
