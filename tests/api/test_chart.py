@@ -203,6 +203,26 @@ class Chart(unittest.TestCase):
             self.assertEqual(point["status"], "skipped")
             self.assertIn("exact n=4 took more than 1e-06 s", point["reason"])
 
+    def test_scenes_below_a_directory_come_with_the_default_scenes_only(self):
+        scenes = self.directory.parent / "scenes"
+        (scenes / "card").mkdir(parents=True)
+        (scenes / "card/card.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n", encoding="utf-8")
+        directory = self.directory.parent / "named"
+        few = ("--size", "16x16", "--methods", "pcf", "--sweep", "none", "--repeat", 1, "--reference-samples", 16)
+        result = run("chart", *few, "builtin:columns:2", "--shared-scenes", scenes, "-o", directory)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        subjects = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["subjects"]
+        self.assertEqual([subject["scene"] for subject in subjects], ["builtin:columns:2"])
+        result = run("chart", *few, "--shared-scenes", scenes / "none", "-o", self.directory.parent / "none")
+        self.assertEqual(result.returncode, USAGE)
+
+    def test_progress_says_how_long_it_will_take_while_the_reference_is_made_too(self):
+        result = run("chart", "builtin:columns:2", "--size", "16x16", "--methods", "pcf", "--sweep", "none", "--repeat", 1,
+                     "-o", self.directory.parent / "progress")
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertRegex(result.stderr, r"(?m)^chart: \d0 %, about (\d+ min )?\d+ s left, builtin:columns:2 reference \d+ of 16$")
+        self.assertRegex(result.stderr, r"about .* left, builtin:columns:2 pcf")
+
     def test_points_that_a_point_light_makes_equal_are_measured_once(self):
         scene = self.directory.parent / "point.obj"
         scene.write_text("v -4 0 -4\nv -4 0 4\nv 4 0 4\nv -1 1 -1\nv -1 1 1\nv 1 1 1\nf 1 2 3\nf 4 5 6\n",
