@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """halfshade atlas and its report: what must hold and what must break, the page in a browser if there is one.
 
-Usage: test_atlas.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check.
+Usage: test_atlas.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check, which
+CI must have.
 """
 
 import json
@@ -174,8 +175,7 @@ class Atlas(unittest.TestCase):
                                  (self.directory / answer["image"]).read_bytes())
 
     def test_the_report_works_in_a_browser(self):
-        if browser.program() is None:
-            self.skipTest("no chromium on PATH")
+        browser.require(self)
         seen = browser.look(self.report, """
           const table = document.getElementById("atlasTable"), metric = document.getElementById("atlasMetric");
           seen.rows = table.querySelectorAll("tr").length;
