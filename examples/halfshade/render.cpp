@@ -386,6 +386,9 @@ void print_summary(const Render& render) {
     }
     if (!l.masks.words.empty()) fmt::print(out, "mask hash  {}\n", l.masks.hash());
     print_shortcuts(out, l.shortcuts);
+    if (!l.shortcuts.empty() && !render.options.measure_shortcuts) {
+      fmt::print(out, "           --measure-shortcuts adds what each gains\n");
+    }
     if (render.options.stats) print_stats(out, s);
   }
   if (!render.options.output.empty()) fmt::print(out, "written    {}\n", render.options.output);

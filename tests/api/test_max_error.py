@@ -140,6 +140,10 @@ class Shortcuts(unittest.TestCase):
         self.assertTrue(shortcuts["back-face-only casters"]["on"])
         self.assertGreater(shortcuts["back-face-only casters"]["gain"], 0)
         self.assertTrue(shortcuts["no alpha path"]["on"])
+        plain = halfshade("render", "builtin:sphere", "--size", "24x24", "--stats", "--quiet").stdout
+        self.assertIn("--measure-shortcuts adds what each gains", plain)
+        measured = halfshade("render", "builtin:sphere", "--size", "24x24", "--measure-shortcuts", "--quiet").stdout
+        self.assertNotIn("--measure-shortcuts", measured)
         fence = halfshade("render", "builtin:fence", "--size", "24x24", "--stats", "--json", "-", "--quiet")
         shortcuts = {s["name"]: s for s in json.loads(fence.stdout)["lights"][0]["shortcuts"]}
         self.assertFalse(shortcuts["no alpha path"]["on"])
