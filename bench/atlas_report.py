@@ -2,7 +2,7 @@
 """Packs what `halfshade atlas` wrote into one HTML file that opens from disk without a network.
 
 Usage: atlas_report.py ATLAS.json -o REPORT.html
-       atlas_report.py ATLAS.json --markdown        the table of docs/atlas.md on standard output
+       atlas_report.py ATLAS.json --markdown        the tables of docs/atlas.md on standard output
 
 The section itself is bench/atlas_section.html, which chart_report.py puts into its page as well. Standard library only.
 """
@@ -49,28 +49,55 @@ def short(value):
     return "0" if value == 0 else f"{value:.3g}"
 
 
-def cell(answers):
+def error_cell(answers):
     """Largest error of V, and wrong bits where there are masks, of the worst of `answers`."""
-    answers = [a for a in answers if "refused" not in a]
-    if not answers:
-        return ""
     worst = max(answers, key=lambda a: a["max"])
     bits = sum(a.get("wrong_bits", 0) for a in answers)
     return short(worst["max"]) + (f" ({bits})" if any("wrong_bits" in a for a in answers) else "")
 
 
-def markdown(atlas):
-    """One line per entry. Exact methods are one column: all of them."""
-    columns = [("exact methods", lambda a: a["id"] in EXACT)] + [
-        (name, lambda a, name=name: a["id"] == name) for name in (
-            "raytrace robust", "raytrace fast", "afsm-lut", "shadow-maps", "pcss", "pcf", "shadow-map",
-            "accumulation bits", "accumulation bits, 8 layers", "accumulation sum")] + [
-        ("textbook form", lambda a: a["method"] == "textbook")]
+def flicker_cell(answers):
+    """Share of flips without a reason, and flicker F, each the largest."""
+    share = max(a["unreasoned_flips"] / a["flips_asked"] for a in answers)
+    return f'{short(100 * share)} %, {short(1000 * max(a["flicker"] for a in answers))}'
+
+
+def ratio_cell(answers):
+    """Time and memory over those of the easy scene, each the largest."""
+    times = [a["ms"] / a["ms_of_easy"] for a in answers if "ms_of_easy" in a]
+    memory = [a["bytes"] / a["bytes_of_easy"] for a in answers if "bytes_of_easy" in a]
+    return ", ".join(f"{max(ratios):.3g}" for ratios in (times, memory) if ratios)
+
+
+def single(names):
+    return [(name, lambda a, name=name: a["id"] == name) for name in names]
+
+
+def table(entries, columns, cell):
+    """One line per entry that has anything to say. A column is a name and which answers it takes."""
     lines = ["| scene | " + " | ".join(name for name, _ in columns) + " |", "|---" * (len(columns) + 1) + "|"]
-    for entry in atlas["entries"]:
-        cells = [cell([a for a in entry["contenders"] if takes(a)]) for _, takes in columns]
-        lines.append(f'| {entry["title"]} | ' + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    for entry in entries:
+        taken = [[a for a in entry["contenders"] if takes(a) and "refused" not in a] for _, takes in columns]
+        if any(taken):
+            cells = [cell(answers) if answers else "" for answers in taken]
+            lines.append(f'| {entry["title"]} | ' + " | ".join(cells) + " |")
+    return lines
+
+
+def markdown(atlas):
+    """Errors of all entries; flips and flicker of those that move; time and memory of those with an easy form."""
+    exact = [("exact methods", lambda a: a["id"] in EXACT)]
+    others = single(("raytrace robust", "raytrace fast", "afsm-lut", "shadow-maps", "pcss", "pcf", "shadow-map",
+                     "accumulation bits", "accumulation bits, 8 layers", "accumulation sum"))
+    textbook = [("textbook form", lambda a: a["method"] == "textbook")]
+    moving = [e for e in atlas["entries"] if e["temporal"]]
+    hot = [e for e in atlas["entries"] if any("ms_of_easy" in a for a in e["contenders"])]
+    tables = [table(atlas["entries"], exact + others + textbook, error_cell)]
+    if moving:
+        tables.append(table(moving, exact + others, flicker_cell))
+    if hot:
+        tables.append(table(hot, single(EXACT) + others, ratio_cell))
+    return "\n\n".join("\n".join(lines) for lines in tables)
 
 
 def main():

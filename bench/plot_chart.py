@@ -15,6 +15,8 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 
+from report_parts import pareto_front  # noqa: E402
+
 COLORS = {  # the same in chart_report.html
     "exact": "#000000", "afsm": "#1f77b4", "afsm-lut": "#17becf", "hpc": "#2ca02c", "gears": "#ff7f0e",
     "stsv": "#9467bd", "shadow-accumulation": "#8c564b", "shadow-map": "#7f7f7f", "pcf": "#bcbd22", "pcss": "#e377c2",
@@ -24,15 +26,6 @@ FLOOR = 1e-5  # errors below are drawn here: a logarithmic axis has no 0
 
 def error_of(point):
     return max(point["against_reference"]["rmse"], FLOOR)
-
-
-def pareto_front(points):
-    """Points that no other beats in both time and error, by time."""
-    front = []
-    for point in sorted(points, key=lambda p: (p["shadow_ms"], error_of(p))):
-        if not front or error_of(point) < error_of(front[-1]):
-            front.append(point)
-    return front
 
 
 def draw_method(axes, method, points):
@@ -47,21 +40,13 @@ def draw_method(axes, method, points):
 
 
 def draw_front(axes, points):
+    """Only its points have labels: all of them together cover each other."""
     front = pareto_front(points)
     axes.step([p["shadow_ms"] for p in front], [error_of(p) for p in front], where="post", color="0.75", linewidth=4,
               zorder=0)
     for point in front:
         axes.annotate(f'{point["method"]} {point["label"]}', (point["shadow_ms"], error_of(point)), fontsize=5.5,
                       xytext=(4, 3), textcoords="offset points", color=COLORS.get(point["method"], "#444444"))
-
-
-def label_others(axes, points):
-    """What varied, small and pale: labels of the front stand out."""
-    on_front = {point["id"] for point in pareto_front(points)}
-    for point in points:
-        if point["id"] not in on_front:
-            axes.annotate(point["label"], (point["shadow_ms"], error_of(point)), fontsize=4.5, alpha=0.7,
-                          xytext=(2, -4), textcoords="offset points", color=COLORS.get(point["method"], "#444444"))
 
 
 def draw_panel(axes, subject, points):
@@ -71,7 +56,6 @@ def draw_panel(axes, subject, points):
     for method, of_method in by_method.items():
         draw_method(axes, method, of_method)
     draw_front(axes, points)
-    label_others(axes, points)
     axes.axhline(max(subject["reference"]["own_rmse"], FLOOR), color="0.6", linestyle=":", linewidth=1)
     light = "" if subject["light"] in ("light", "key") else f', {subject["light"]}'
     axes.set(xscale="log", yscale="log", title=pathlib.Path(subject["scene"]).stem.removeprefix("builtin:") + light)

@@ -1,7 +1,17 @@
-"""What the HTML reports share: pictures and data inside the page. Standard library only."""
+"""What the plots and HTML reports share: the Pareto front, pictures and data inside the page. Standard library only."""
 
 import base64
 import json
+
+
+def pareto_front(points):
+    """Points of a chart that no other beats in time or RMSE without losing in the other, by time. Of equal ones the first.
+    The same in chart_report.html, for any error."""
+    front = []
+    for point in sorted(points, key=lambda p: (p["shadow_ms"], p["against_reference"]["rmse"])):
+        if not front or point["against_reference"]["rmse"] < front[-1]["against_reference"]["rmse"]:
+            front.append(point)
+    return front
 
 
 def data_uri(content, kind):

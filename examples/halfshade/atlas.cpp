@@ -117,6 +117,7 @@ ordered_json answer_json(const AtlasEntry& entry, const AtlasContender& contende
   json["ms"] = answer.ms;
   if (answer.easy_ms > 0.0) json["ms_of_easy"] = answer.easy_ms;
   json["bytes"] = answer.bytes;
+  if (answer.easy_bytes > 0) json["bytes_of_easy"] = answer.easy_bytes;
   if (answer.has_masks) json["wrong_bits"] = answer.wrong_bits, json["bits"] = answer.bits;
   json.update(
       shown_json(pictures, contender.id, answer.visibility, measures.truth, entry.low, entry.high, entry.error_range));

@@ -36,7 +36,8 @@ struct AtlasEntry {
   std::uint32_t repeat = 1;     // rows of the picture that a row of points fills
   std::size_t frame_count = 1;  // their pictures stand one below the other
   std::function<AtlasFrame(std::size_t frame)> frame;
-  std::function<AtlasFrame(std::size_t frame)> easy;  // the same amount of work without the difficulty: times only
+  std::function<AtlasFrame(std::size_t frame)>
+      easy;  // the same amount of work without the difficulty: for time and memory
   std::function<AtlasFrame(std::size_t frame)> truth_frame;            // whose oracle is the truth; empty: `frame`
   std::function<double(std::size_t frame, const dvec3& point)> truth;  // V where it is known better than by the oracle
   std::string truth_is = "oracle, the same light samples";

@@ -169,7 +169,7 @@ class EntryMeasurement {
       check_progress(c);
       ask_contender(c, frame);
     }
-    if (entry_.easy) time_against_easy(k, frame);
+    if (entry_.easy) compare_with_easy(k, frame);
     if (!entry_.temporal) return;
     if (k > 0) {
       measures_.truth_flips_per_frame.push_back(differing_bits(base.oracle, oracle_before_, frame.points.size()));
@@ -223,7 +223,7 @@ class EntryMeasurement {
   }
 
   /// Runs of the hard and of the easy frame in turn, so that whatever slows the machine meets both.
-  void time_against_easy(std::size_t k, const AtlasFrame& frame) {
+  void compare_with_easy(std::size_t k, const AtlasFrame& frame) {
     const AtlasFrame easy = entry_.easy(k);
     for (std::size_t c = 0; c < entry_.contenders.size(); ++c) {
       AtlasAnswer& answer = measures_.answers[c];
@@ -234,7 +234,9 @@ class EntryMeasurement {
       std::vector<double> hard_ms, easy_ms;
       for (int run = 0; run < kTimedRuns; ++run) {
         hard_ms.push_back(ask(contender, hard_question).ms);
-        easy_ms.push_back(ask(contender, easy_question).ms);
+        const Reply easy_reply = ask(contender, easy_question);
+        easy_ms.push_back(easy_reply.ms);
+        answer.easy_bytes = std::max(answer.easy_bytes, easy_reply.stats.bytes);
       }
       answer.ms = median(hard_ms), answer.easy_ms = median(easy_ms);
     }

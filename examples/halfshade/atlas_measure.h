@@ -17,7 +17,7 @@ struct AtlasAnswer {
   std::vector<std::uint64_t> flips_per_frame;  // changed bits, or values of V without masks, since the frame before
   double flicker = 0.0;                        // mean of `change` over all frames but the first and last
   double ms = 0.0, easy_ms = 0.0;              // of all frames; medians where an entry has an easy form
-  std::uint64_t bytes = 0;                     // working memory, largest of all frames
+  std::uint64_t bytes = 0, easy_bytes = 0;     // working memory, largest of all frames
   std::vector<std::pair<std::string, double>> details;  // of the last frame (ShadowStats)
   std::string refused;                                  // why the method gave no answer
 };

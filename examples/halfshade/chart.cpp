@@ -31,7 +31,7 @@ std::string time_text(double seconds) {
   return whole < 60 ? fmt::format("{} s", whole) : fmt::format("{} min {:02} s", whole / 60, whole % 60);
 }
 
-/// Equal lengths of work per scene, light and run of a point.
+/// Equal lengths of work per scene, light and step: a run of a point, or a set of the reference.
 class ChartProgress {
  public:
   ChartProgress(std::size_t scenes, bool quiet) : progress_("chart", quiet), scenes_(static_cast<double>(scenes)) {}
@@ -89,7 +89,7 @@ class LightChart {
         options_(options),
         file_(file),
         progress_(progress),
-        subject_(pipeline, light, options),
+        subject_(pipeline, light, options, [this](std::uint32_t set) { begin_set(set); }),
         series_(chart_series(options)) {
     file.expect_inputs(options.scene, light.name, subject_.inputs_hash());
     const std::string scene = std::filesystem::path(options.scene).stem().string();
@@ -99,10 +99,14 @@ class LightChart {
     if (light.shape == LightShape::kSamples) {
       fix_sample_count(series_, static_cast<std::uint32_t>(light.points.size()));
     }
-    for (const ChartSeries& series : series_) total_ += series.points.size();
+    for (const ChartSeries& series : series_) steps_ += series.points.size() * options.repeat;
   }
 
   void make() {
+    if (needs_reference()) {
+      steps_ += subject_.reference_sets();
+      subject_.reference();
+    }
     if (!file_.has_subject(options_.scene, light_.name)) file_.set_subject(describe());
     for (const ChartSeries& series : series_) make_series(series);
     for (std::uint32_t round = 1; round < options_.repeat; ++round) time_again(round);
@@ -126,10 +130,27 @@ class LightChart {
     }
   }
 
-  void begin_run(const ChartPoint& point) {
+  void begin_step(const std::string& what) {
     if (stop_signal() != 0) throw Error(ErrorCode::kCancelled, "cancelled");
-    progress_.step(static_cast<double>(done_++) / static_cast<double>(total_ * options_.repeat),
-                   fmt::format("{} {}", options_.scene, point.id));
+    progress_.step(static_cast<double>(done_++) / static_cast<double>(steps_),
+                   fmt::format("{} {}", options_.scene, what));
+  }
+
+  void begin_run(const ChartPoint& point) { begin_step(point.id); }
+
+  void begin_set(std::uint32_t set) {
+    begin_step(fmt::format("reference {} of {}", set + 1, subject_.reference_sets()));
+  }
+
+  /// Not when all points were measured in an earlier process.
+  bool needs_reference() {
+    if (!file_.has_subject(options_.scene, light_.name)) return true;
+    for (const ChartSeries& series : series_) {
+      for (const ChartPoint& point : series.points) {
+        if (find(point) == nullptr) return true;
+      }
+    }
+    return false;
   }
 
   ordered_json* find(const ChartPoint& point) { return file_.find_point(options_.scene, light_.name, point.id); }
@@ -223,9 +244,9 @@ class LightChart {
   ChartProgress& progress_;
   ChartSubject subject_;
   std::vector<ChartSeries> series_;
-  std::string image_directory_;  // below the output directory
-  std::size_t total_ = 0, done_ = 0;
-  bool changed_ = false;  // a point was measured in this process
+  std::string image_directory_;       // below the output directory
+  std::size_t steps_ = 0, done_ = 0;  // runs of points, and sets of the reference
+  bool changed_ = false;              // a point was measured in this process
 };
 
 void run(ChartOptions options) {
@@ -259,7 +280,8 @@ void add_chart(CLI::App& app, const std::string& command_line) {
   auto o = std::make_shared<ChartOptions>();
   o->size.clear();
   verb->add_option("scenes", o->scenes, "OBJ files or builtin:NAME[:SIZE] (default: all built-in scenes)");
-  verb->add_option("--shared-scenes", o->shared_scenes, "Also all OBJ files below this directory");
+  verb->add_option("--shared-scenes", o->shared_scenes,
+                   "With the default scenes, but not with --quick: also all OBJ files below this directory");
   verb->add_option("--methods", o->methods, "Methods, separated by commas (default: all but oracle)")
       ->delimiter(',')
       ->allow_extra_args(false);

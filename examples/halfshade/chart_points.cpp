@@ -135,9 +135,11 @@ std::uint32_t nearest_sample_count(const std::vector<std::uint32_t>& samples) {
 }  // namespace
 
 void complete_options(ChartOptions& o) {
-  if (o.scenes.empty()) o.scenes = default_scenes(o);
-  if (!o.shared_scenes.empty()) {
-    for (const std::string& scene : scenes_below(o.shared_scenes)) o.scenes.push_back(scene);
+  if (o.scenes.empty()) {
+    o.scenes = default_scenes(o);
+    if (!o.shared_scenes.empty() && !o.quick) {
+      for (const std::string& scene : scenes_below(o.shared_scenes)) o.scenes.push_back(scene);
+    }
   }
   if (o.size.empty()) o.size = o.quick ? "128x128" : "256x256";
   if (o.methods.empty()) {

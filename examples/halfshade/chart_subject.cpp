@@ -50,8 +50,9 @@ VisibilityImage spread(const ReceiverArray& receivers, const std::vector<float>&
 
 }  // namespace
 
-ChartSubject::ChartSubject(const Pipeline& pipeline, const Light& light, const ChartOptions& options)
-    : pipeline_(pipeline), light_(light), options_(options) {
+ChartSubject::ChartSubject(const Pipeline& pipeline, const Light& light, const ChartOptions& options,
+                           std::function<void(std::uint32_t)> on_set)
+    : pipeline_(pipeline), light_(light), options_(options), on_set_(std::move(on_set)) {
   ShadowConfig config = shadow_config(options);
   config.light_sample_count = options.base_samples;
   const Question& asked = question(config);
@@ -110,6 +111,10 @@ const VisibilityImage& ChartSubject::reference() {
   return reference_;
 }
 
+std::uint32_t ChartSubject::reference_sets() const {
+  return (options_.reference_samples + kReferenceSetSize - 1) / kReferenceSetSize;
+}
+
 /// The mean of many sets, kept as two halves whose difference tells how far it may be trusted. Only pixels that are
 /// receivers of every set are compared: where the tangent plane cuts off all but a sliver of the light, a set that
 /// misses the sliver says 0 and one that meets it counts the samples below the plane as well, so that V there is no
@@ -121,7 +126,7 @@ void ChartSubject::make_reference() {
   config.light_sample_count = std::min(options_.reference_samples, kReferenceSetSize);
   config.sample_sets = 1;
   config.progress = [](double) { return stop_signal() == 0; };
-  const std::uint32_t sets = (options_.reference_samples + config.light_sample_count - 1) / config.light_sample_count;
+  const std::uint32_t sets = reference_sets();
   const std::size_t pixels = pipeline_.gbuffer.size();
   std::array<std::vector<double>, 2> halves = {std::vector<double>(pixels, 0.0), std::vector<double>(pixels, 0.0)};
   std::array<std::uint32_t, 2> sets_of_half = {0, 0};
@@ -129,6 +134,7 @@ void ChartSubject::make_reference() {
   VisibilityMasks masks;
   ShadowStats stats;
   for (std::uint32_t set = 0; set < sets; ++set) {
+    on_set_(set);
     config.frame = kReferenceFrame + set;
     const LightSamples samples = make_light_samples(light_, config, pipeline_.mesh.frame);
     const ReceiverArray receivers = make_receivers(pipeline_.gbuffer, samples, config.seed);

@@ -1,6 +1,7 @@
 // One light of one scene, and how far each method's answer is from the exact one and from the converged one.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -13,14 +14,16 @@ using VisibilityImage = std::vector<float>;
 
 class ChartSubject {
  public:
-  /// `pipeline` and `light` must outlive it.
-  ChartSubject(const Pipeline& pipeline, const Light& light, const ChartOptions& options);
+  /// `pipeline` and `light` must outlive it. `on_set` hears of each set of the reference before it is solved.
+  ChartSubject(const Pipeline& pipeline, const Light& light, const ChartOptions& options,
+               std::function<void(std::uint32_t)> on_set);
 
   /// Hash of scene, camera, size and light: of the receivers and of two sets of light samples.
   const std::string& inputs_hash() const { return inputs_hash_; }
   /// {"scene", "light", ..., "reference", "exact_checked"}; makes the reference if nobody has asked for it yet.
   nlohmann::ordered_json describe();
   const VisibilityImage& reference();
+  std::uint32_t reference_sets() const;
 
   /// What came out of one run. `reason` is why nothing did: the time limit, or the method refused.
   struct Run {
@@ -52,6 +55,7 @@ class ChartSubject {
   const Pipeline& pipeline_;
   const Light& light_;
   const ChartOptions& options_;
+  std::function<void(std::uint32_t)> on_set_;
   std::string inputs_hash_;
   std::map<std::uint32_t, Question> questions_;  // by number of light samples
   VisibilityImage reference_;

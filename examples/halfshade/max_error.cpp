@@ -44,6 +44,22 @@ double parse_max_error(const std::string& text) {
   return value / divisor;
 }
 
+void check_max_error_options(const PipelineOptions& o) {
+  const PipelineOptions defaults;
+  if (o.method != defaults.method || o.pattern != defaults.pattern || o.light_samples != defaults.light_samples ||
+      o.sets != defaults.sets || o.interleave || o.rotate) {
+    usage_error("--max-error chooses method, pattern, sets and number of samples itself");
+  }
+}
+
+std::string max_error_obstacle(const Pipeline& pipeline) {
+  if (!pipeline.panes.empty()) return "the scene has translucent triangles";
+  for (const Light& light : pipeline.source.view.lights) {
+    if (!light.emission_image.empty()) return "light '" + light.name + "' has an emission image";
+  }
+  return {};
+}
+
 ReceiverArray receivers_of_whole_light(const GBuffer& gbuffer, const Light& light, const ShadowConfig& asked,
                                        const LocalFrame& frame) {
   ShadowConfig config = asked;

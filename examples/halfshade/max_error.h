@@ -7,8 +7,17 @@
 
 namespace halfshade {
 
+struct Pipeline;
+struct PipelineOptions;
+
 /// "1/256", "0.004" or "0.4%". Throws Error{kUsage} for anything else and for goals out of range.
 double parse_max_error(const std::string& text);
+
+/// Throws Error{kUsage} where options choose what an error of visibility chooses itself.
+void check_max_error_options(const PipelineOptions& options);
+
+/// Why --max-error refuses this scene and its lights, or nothing.
+std::string max_error_obstacle(const Pipeline& pipeline);
 
 /// Receivers of one light for solve_to_error.
 ReceiverArray receivers_of_whole_light(const GBuffer& gbuffer, const Light& light, const ShadowConfig& config,

@@ -1,10 +1,13 @@
-// halfshade recommend: which setting keeps a given error of visibility on this scene, and is the cheapest?
+// halfshade recommend: which setting keeps a given error of visibility on this scene under all its lights, and is the
+// cheapest?
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <optional>
+#include <span>
 
 #include "max_error.h"
 #include "pipeline.h"
@@ -53,11 +56,13 @@ void add(std::vector<Candidate>& all, ShadowMethod method, SamplePattern pattern
   all.push_back(std::move(c));
 }
 
-std::vector<Candidate> candidates(const RecommendOptions& o) {
+/// `obstacle`: why --max-error is not among them.
+std::vector<Candidate> candidates(const RecommendOptions& o, const std::string& obstacle) {
   std::vector<Candidate> all;
   Candidate adaptive;
   adaptive.config = shadow_config(o), adaptive.adaptive = true;
   adaptive.name = "max-error " + o.max_error, adaptive.arguments = "--max-error " + o.max_error;
+  adaptive.reason = obstacle;
   all.push_back(std::move(adaptive));
   for (const std::uint32_t n : {16u, 64u, 256u, 1024u, 4096u}) {
     add(all, ShadowMethod::kExact, SamplePattern::kRows, n, o);
@@ -119,7 +124,7 @@ void measure_error(const Subject& s, double goal, Candidate& c) {
 
 /// Interleaved, so that what else the machine does meets all alike. A setting that took its time is not repeated.
 std::vector<Candidate> measure(const Subject& s, const RecommendOptions& o) {
-  std::vector<Candidate> all = candidates(o);
+  std::vector<Candidate> all = candidates(o, max_error_obstacle(*s.pipeline));
   Progress progress("settings under " + s.light->name, o.quiet);
   for (std::uint32_t round = 0; round < o.repeat; ++round) {
     for (std::size_t k = 0; k < all.size(); ++k) {
@@ -139,11 +144,30 @@ std::vector<Candidate> measure(const Subject& s, const RecommendOptions& o) {
 
 bool keeps_goal(const Candidate& c, double goal) { return c.reason.empty() && c.largest <= goal; }
 
-/// The cheapest of those that keep the goal on every receiver, or null.
-const Candidate* cheapest(const std::vector<Candidate>& all, double goal) {
-  const Candidate* best = nullptr;
-  for (const Candidate& c : all) {
-    if (keeps_goal(c, goal) && (best == nullptr || median(c.shadow_ms) < median(best->shadow_ms))) best = &c;
+/// Candidates of one light, in the same order for every light.
+struct MeasuredLight {
+  std::string name;
+  std::size_t receivers = 0;
+  std::vector<Candidate> candidates;
+};
+
+struct Choice {
+  std::size_t candidate = 0;
+  double ms = 0.0;  // of all lights together
+};
+
+/// `render` takes one setting for all lights: the cheapest of those that keep the goal on every receiver of all of
+/// them.
+std::optional<Choice> cheapest(std::span<const MeasuredLight> lights, double goal) {
+  std::optional<Choice> best;
+  for (std::size_t k = 0; k < lights.front().candidates.size(); ++k) {
+    double ms = 0.0;
+    bool keeps = true;
+    for (const MeasuredLight& light : lights) {
+      keeps = keeps && keeps_goal(light.candidates[k], goal);
+      ms += median(light.candidates[k].shadow_ms);
+    }
+    if (keeps && (!best || ms < best->ms)) best = Choice{k, ms};
   }
   return best;
 }
@@ -169,60 +193,81 @@ ordered_json candidates_json(const std::vector<Candidate>& all, double goal) {
   return points;
 }
 
-void print_candidates(const std::vector<Candidate>& all, const Candidate* best, double goal) {
+void print_candidates(const MeasuredLight& light, double goal) {
+  const std::optional<Choice> best = cheapest({&light, 1}, goal);
   fmt::print("  {:32} {:>10} {:>10} {:>9} {:>9} {:>9}\n", "setting", "shadow ms", "build ms", "rmse", "max", "% above");
-  for (const Candidate& c : all) {
+  for (std::size_t k = 0; k < light.candidates.size(); ++k) {
+    const Candidate& c = light.candidates[k];
     if (!c.reason.empty()) {
       fmt::print("  {:32} {}\n", c.name, c.reason);
       continue;
     }
     fmt::print("  {:32} {:10.1f} {:10.1f} {:9.5f} {:9.5f} {:9.3f} {}\n", c.name, median(c.shadow_ms),
                median(c.build_ms), c.rmse, c.largest, 100.0 * c.share_above,
-               &c == best ? "<- cheapest" : (keeps_goal(c, goal) ? "keeps it" : ""));
+               best && best->candidate == k ? "<- cheapest" : (keeps_goal(c, goal) ? "keeps it" : ""));
   }
+}
+
+MeasuredLight measure_light(const Pipeline& pipeline, const Light& light, const RecommendOptions& o) {
+  Subject s{&pipeline, &light, {}, {}};
+  const ShadowConfig config = shadow_config(o);
+  s.receivers = receivers_of_whole_light(pipeline.gbuffer, light, config, pipeline.mesh.frame);
+  std::vector<std::uint32_t> all(s.receivers.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  s.truth = converged_visibility(pipeline.mesh, s.receivers, light, config, o.goal, all);
+  return {light.name, s.receivers.size(), measure(s, o)};
+}
+
+/// What to type, with all options that decided what was measured; null if no setting keeps the goal.
+ordered_json recommendation_json(const RecommendOptions& o, std::span<const MeasuredLight> lights) {
+  const std::optional<Choice> best = cheapest(lights, o.goal);
+  if (!best) return {};
+  const std::string& setting = lights.front().candidates[best->candidate].arguments;
+  return {{"setting", setting}, {"shadow_ms", best->ms}, {"command", picture_command(o) + " " + setting}};
+}
+
+ordered_json report_json(const RecommendOptions& o, std::span<const MeasuredLight> measured,
+                         const ordered_json& recommended) {
+  ordered_json lights = ordered_json::array();
+  for (const MeasuredLight& light : measured) {
+    lights.push_back({{"name", light.name},
+                      {"receivers", light.receivers},
+                      {"reference_samples", kConvergedSamples},
+                      {"points", candidates_json(light.candidates, o.goal)}});
+  }
+  return {{"schema", "halfshade.recommend/1"},
+          {"version", HALFSHADE_VERSION},
+          {"command", o.command_line},
+          {"machine", machine_json()},
+          {"scene", o.scene},
+          {"size", o.size},
+          {"max_error", o.goal},
+          {"recommended", recommended},
+          {"lights", lights}};
 }
 
 int run(RecommendOptions o) {
   o.goal = parse_max_error(o.max_error);
   if (o.repeat < 1 || o.repeat > 100) usage_error(fmt::format("--repeat {} is not in 1..100", o.repeat));
+  check_max_error_options(o);
   Pipeline pipeline;
   open_pipeline(o, 0.0, pipeline);
-  ordered_json lights = ordered_json::array();
-  bool found_all = true;
+  std::vector<MeasuredLight> lights;
   for (const Light& light : pipeline.source.view.lights) {
-    Subject s{&pipeline, &light, {}, {}};
-    const ShadowConfig config = shadow_config(o);
-    s.receivers = receivers_of_whole_light(pipeline.gbuffer, light, config, pipeline.mesh.frame);
-    std::vector<std::uint32_t> all(s.receivers.size());
-    for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-    s.truth = converged_visibility(pipeline.mesh, s.receivers, light, config, o.goal, all);
-    const std::vector<Candidate> measured = measure(s, o);
-    const Candidate* best = cheapest(measured, o.goal);
-    found_all = found_all && best != nullptr;
-    lights.push_back({{"name", light.name},
-                      {"receivers", s.receivers.size()},
-                      {"reference_samples", kConvergedSamples},
-                      {"recommended", best != nullptr ? ordered_json(best->arguments) : ordered_json()},
-                      {"points", candidates_json(measured, o.goal)}});
+    lights.push_back(measure_light(pipeline, light, o));
     if (o.json) continue;
     fmt::print("light {}: {} receivers of a picture of {}, against {} samples; goal {:.6f}\n", light.name,
-               s.receivers.size(), o.size, kConvergedSamples, o.goal);
-    print_candidates(measured, best, o.goal);
-    fmt::print("recommended: {}\n", best != nullptr ? "halfshade render " + o.scene + " " + best->arguments
-                                                    : "none of these keeps the goal on every receiver");
+               lights.back().receivers, o.size, kConvergedSamples, o.goal);
+    print_candidates(lights.back(), o.goal);
   }
+  const ordered_json recommended = recommendation_json(o, lights);
   if (o.json) {
-    const ordered_json json = {{"schema", "halfshade.recommend/1"},
-                               {"version", HALFSHADE_VERSION},
-                               {"command", o.command_line},
-                               {"machine", machine_json()},
-                               {"scene", o.scene},
-                               {"size", o.size},
-                               {"max_error", o.goal},
-                               {"lights", lights}};
-    std::fputs((json.dump(2) + "\n").c_str(), stdout);
+    std::fputs((report_json(o, lights, recommended).dump(2) + "\n").c_str(), stdout);
+  } else {
+    fmt::print("recommended: {}\n", recommended.is_null() ? "none of these keeps the goal on every receiver"
+                                                          : recommended.at("command").get<std::string>());
   }
-  return found_all ? kOk : kDifferent;
+  return recommended.is_null() ? kDifferent : kOk;
 }
 
 }  // namespace
@@ -237,8 +282,9 @@ void add_recommend(CLI::App& app, const std::string& command_line, int& exit_cod
   verb->add_option("--repeat", o->repeat, "Runs of each setting; medians count")->capture_default_str();
   verb->add_option("--time-limit", o->time_limit, "Seconds for one setting")->capture_default_str();
   verb->add_flag("--json", o->json, "All points as JSON on standard output");
-  verb->callback([o, &exit_code, command_line] {
+  verb->callback([o, verb, &exit_code, command_line] {
     o->command_line = command_line;
+    o->arguments = deciding_arguments(*verb);
     run_in_arena(o->threads, [&] { exit_code = run(*o); });
   });
 }

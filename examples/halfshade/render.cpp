@@ -386,26 +386,12 @@ void print_summary(const Render& render) {
     }
     if (!l.masks.words.empty()) fmt::print(out, "mask hash  {}\n", l.masks.hash());
     print_shortcuts(out, l.shortcuts);
+    if (!l.shortcuts.empty() && !render.options.measure_shortcuts) {
+      fmt::print(out, "           --measure-shortcuts adds what each gains\n");
+    }
     if (render.options.stats) print_stats(out, s);
   }
   if (!render.options.output.empty()) fmt::print(out, "written    {}\n", render.options.output);
-}
-
-/// What --max-error does not go with.
-void check_error_goal(const RenderOptions& o) {
-  const PipelineOptions defaults;
-  if (o.method != defaults.method || o.pattern != defaults.pattern || o.light_samples != defaults.light_samples ||
-      o.sets != defaults.sets || o.interleave || o.rotate) {
-    usage_error("--max-error chooses method, pattern, sets and number of samples itself");
-  }
-  if (!o.dump.empty()) usage_error("--max-error: --dump needs the same samples for all receivers");
-}
-
-void check_error_goal(const Render& render) {
-  if (!render.panes.empty()) usage_error("--max-error: the scene has translucent triangles");
-  for (const Light& light : render.source.view.lights) {
-    if (!light.emission_image.empty()) usage_error("--max-error: light '" + light.name + "' has an emission image");
-  }
 }
 
 }  // namespace
@@ -443,10 +429,13 @@ int run(const RenderOptions& options) {
   check_render_options(options);
   if (options.max_error) {
     render.options.error_goal = parse_max_error(*options.max_error);
-    check_error_goal(options);
+    check_max_error_options(options);
+    if (!options.dump.empty()) usage_error("--max-error: --dump needs the same samples for all receivers");
   }
   open_pipeline(options, 0.0, render);
-  if (render.options.error_goal > 0.0) check_error_goal(render);
+  if (const std::string obstacle = max_error_obstacle(render); options.max_error && !obstacle.empty()) {
+    usage_error("--max-error: " + obstacle);
+  }
   if (!render.panes.empty() && !yields_masks(shadow_config(options))) {
     fmt::print(stderr,
                "halfshade: warning: {} translucent triangles: {} does not know which light samples it sees; its "

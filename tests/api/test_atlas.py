@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """halfshade atlas and its report: what must hold and what must break, the page in a browser if there is one.
 
-Usage: test_atlas.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check.
+Usage: test_atlas.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check, which
+CI must have.
 """
 
 import json
@@ -154,13 +155,32 @@ class Atlas(unittest.TestCase):
         blocked.write_text("")
         self.assertEqual(run("atlas", "winding", "--quick", "-o", blocked).returncode, OUTPUT)
 
-    def test_the_table_for_the_documentation(self):
+    def test_the_tables_for_the_documentation(self):
         result = run(SOURCES / "bench/atlas_report.py", self.directory / "atlas.json", "--markdown",
                      program=sys.executable)
         self.assertEqual(result.returncode, OK, result.stderr)
-        lines = result.stdout.splitlines()
-        self.assertEqual(len(lines), 2 + len(self.entries))
-        self.assertTrue(all(line.count("|") == lines[0].count("|") for line in lines))
+        errors, moving, hot = (text.splitlines() for text in result.stdout.split("\n\n"))
+        for lines, entries in ((errors, set(BREAK)), (moving, {"moving_light", "moving_camera"}), (hot, {"hot_cell", "crowd"})):
+            self.assertEqual([line.split(" | ")[0] for line in lines[2:]],
+                             ["| " + e["title"] for e in self.atlas["entries"] if e["id"] in entries])
+            self.assertTrue(all(line.count("|") == lines[0].count("|") for line in lines))
+        pcss = self.answers("moving_camera")["pcss"]
+        share = 100 * pcss["unreasoned_flips"] / pcss["flips_asked"]
+        self.assertIn(f' {share:.3g} %, {1000 * pcss["flicker"]:.3g} ', moving[3])
+        self.assertIn("| 0 %, 0 |", moving[3])
+        gears = self.answers("hot_cell")["gears"]
+        self.assertIn(f' {gears["ms"] / gears["ms_of_easy"]:.3g}, {gears["bytes"] / gears["bytes_of_easy"]:.3g} ', hot[2])
+
+    def test_the_sheet_for_the_documentation(self):
+        if subprocess.run([sys.executable, "-c", "import matplotlib"], capture_output=True, check=False).returncode != 0:
+            self.skipTest("no matplotlib")
+        if "raytrace robust" not in self.answers("wire"):
+            self.skipTest("built without Embree")
+        sheet = self.directory.parent / "sheet.png"
+        result = run(SOURCES / "bench/plot_atlas.py", self.directory / "atlas.json", "-o", sheet, "--dpi", 20,
+                     program=sys.executable)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertTrue(sheet.read_bytes().startswith(b"\x89PNG"))
 
     def test_the_report_needs_no_network_and_holds_every_picture(self):
         page = self.report.read_text(encoding="utf-8")
@@ -174,8 +194,7 @@ class Atlas(unittest.TestCase):
                                  (self.directory / answer["image"]).read_bytes())
 
     def test_the_report_works_in_a_browser(self):
-        if browser.program() is None:
-            self.skipTest("no chromium on PATH")
+        browser.require(self)
         seen = browser.look(self.report, """
           const table = document.getElementById("atlasTable"), metric = document.getElementById("atlasMetric");
           seen.rows = table.querySelectorAll("tr").length;

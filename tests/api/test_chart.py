@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """halfshade chart, its plots and its report: contents, going on after a stop, the page in a browser if there is one.
 
-Usage: test_chart.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check.
+Usage: test_chart.py HALFSHADE [unittest arguments]. Standard library only; a headless chromium on PATH adds a check, which
+CI must have.
 """
 
 import base64
@@ -21,7 +22,9 @@ import xml.etree.ElementTree
 PROGRAM = os.path.abspath(sys.argv.pop(1)) if len(sys.argv) > 1 else "halfshade"
 SOURCES = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(SOURCES / "tests/tools"))
+sys.path.insert(0, str(SOURCES / "bench"))
 import browser  # noqa: E402
+import report_parts  # noqa: E402
 
 OK, USAGE, BAD_INPUT = 0, 2, 3
 POINTS = ("builtin:columns", "--size", "64x64", "--methods", "exact,pcf", "--samples", "4,16", "--sweep",
@@ -29,6 +32,8 @@ POINTS = ("builtin:columns", "--size", "64x64", "--methods", "exact,pcf", "--sam
 SMALL = (*POINTS, "--repeat", 2)
 COUNT = 2 + 1 + 2  # exact with two numbers of samples; pcf by default and with two resolutions
 
+# Time and error of points, with ties in either and in both.
+TIES = [(3.0, 0.2), (1.0, 0.5), (1.0, 0.4), (2.0, 0.4), (2.0, 0.3), (2.0, 0.3), (4.0, 0.2), (5.0, 0.0), (6.0, 0.0), (0.5, 0.9)]
 # Acts on the loaded page like a user and notes what it saw.
 ACTIONS = """
 const read = canvas => {  // from a copy, so that the page's own canvases stay as they are
@@ -38,7 +43,7 @@ const read = canvas => {  // from a copy, so that the page's own canvases stay a
   context.drawImage(canvas, 0, 0);
   return context;
 };
-const pixel = (canvas, u) => [...read(canvas).getImageData(canvas.width * u, canvas.height / 4, 1, 1).data];
+const pixel = (canvas, u) => [...read(canvas).getImageData(canvas.width * u, canvas.height / 4, 1, 1).data].slice(0, 3);
 const brightness = canvas => read(canvas).getImageData(0, 0, canvas.width, canvas.height).data.reduce((a, b) => a + b, 0);
 const act = (canvas, type, u, v, more) => {
   const box = canvas.getBoundingClientRect();
@@ -54,11 +59,16 @@ act(third, "pointerdown", 0.5, 0.5); act(third, "pointermove", 0.9, 0.5); act(th
 await drawSlots();
 seen.wipe = state.wipe;
 seen.wiped = pixel(third, 0.9);
-const before = brightness(document.getElementById("canvasA"));
-third.dispatchEvent(new WheelEvent("wheel", {deltaY: -1, clientX: third.getBoundingClientRect().left + 5, clientY: third.getBoundingClientRect().top + 5}));
-await drawSlots();
-seen.zoom = state.zoom;
-seen.zoomed = brightness(document.getElementById("canvasA")) !== before;
+const canvases = ["canvasA", "canvasB", "canvasC"].map(id => document.getElementById(id));
+seen.zoom = [];
+seen.zoomed = [];
+for (const canvas of canvases) {  // the wheel over any of them zooms all
+  const before = canvases.map(brightness), box = canvas.getBoundingClientRect();
+  canvas.dispatchEvent(new WheelEvent("wheel", {deltaY: -1, clientX: box.left + 5, clientY: box.top + 5}));
+  await drawSlots();
+  seen.zoom.push(state.zoom);
+  seen.zoomed.push(canvases.map(brightness).filter((b, i) => b !== before[i]).length);
+}
 document.getElementById("mode").value = "difference";
 await drawSlots();
 seen.difference = document.getElementById("shown").textContent;
@@ -69,12 +79,47 @@ state.flicker = true; await drawSlots();
 seen.flickers = shownA === brightness(document.getElementById("canvasA")) && shownA !== brightness(third);
 document.querySelector(".point").dispatchEvent(new MouseEvent("mousemove", {bubbles: true}));
 seen.tip = document.querySelector("#tip img").src.slice(0, 22);
+// Pictures made of four grey columns: A brighter in the first, darker in the last.
+const columns = greys => {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = greys.length;
+  const context = canvas.getContext("2d");
+  greys.forEach((g, x) => { context.fillStyle = `rgb(${g},${g},${g})`; context.fillRect(x, 0, 1, greys.length); });
+  const values = Uint8Array.from({length: greys.length ** 2}, (_, i) => greys[i % greys.length]);
+  return {canvas, values, width: greys.length, height: greys.length};
+};
+decoded.set(numberOf(state.a), columns([150, 100, 100, 50]));
+decoded.set(numberOf(state.b), columns([100, 100, 100, 100]));
+state.zoom = 1; state.x = state.y = 0; state.row = null;
+document.getElementById("mode").value = "difference"; document.getElementById("range").value = "0.0625";
+await drawSlots();
+seen.legend = [0.125, 0.375, 0.875].map(u => pixel(third, u));
+document.getElementById("mode").value = "wipe"; state.wipe = 0.9;
+await drawSlots();
+seen.sides = [0.125, 0.8, 0.95].map(u => pixel(third, u));
+// The front of the chart, and of points with equal times and errors.
+seen.front = paretoFront(measured()).map(p => p.id);
+seen.ties = paretoFront(TIES.map(([ms, rmse], i) => ({i, shadow_ms: ms, against_reference: {rmse}}))).map(p => p.i);
 seen.atlas = document.querySelectorAll("#atlasEntries article").length;
 """
 
 
 def run(*arguments, program=PROGRAM):
     return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
+
+
+def tied_points():
+    return [{"id": i, "shadow_ms": ms, "against_reference": {"rmse": rmse}} for i, (ms, rmse) in enumerate(TIES)]
+
+
+class ParetoFront(unittest.TestCase):
+    def test_it_is_the_points_that_no_other_beats(self):
+        def beats(a, b):
+            return a != b and a[0] <= b[0] and a[1] <= b[1]
+        expected = sorted({p for p in TIES if not any(beats(q, p) for q in TIES)})
+        self.assertEqual([TIES[p["id"]] for p in report_parts.pareto_front(tied_points())], expected)
+        self.assertEqual(len(expected), 5)
+        self.assertEqual(report_parts.pareto_front([]), [])
 
 
 class Chart(unittest.TestCase):
@@ -203,6 +248,26 @@ class Chart(unittest.TestCase):
             self.assertEqual(point["status"], "skipped")
             self.assertIn("exact n=4 took more than 1e-06 s", point["reason"])
 
+    def test_scenes_below_a_directory_come_with_the_default_scenes_only(self):
+        scenes = self.directory.parent / "scenes"
+        (scenes / "card").mkdir(parents=True)
+        (scenes / "card/card.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n", encoding="utf-8")
+        directory = self.directory.parent / "named"
+        few = ("--size", "16x16", "--methods", "pcf", "--sweep", "none", "--repeat", 1, "--reference-samples", 16)
+        result = run("chart", *few, "builtin:columns:2", "--shared-scenes", scenes, "-o", directory)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        subjects = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["subjects"]
+        self.assertEqual([subject["scene"] for subject in subjects], ["builtin:columns:2"])
+        result = run("chart", *few, "--shared-scenes", scenes / "none", "-o", self.directory.parent / "none")
+        self.assertEqual(result.returncode, USAGE)
+
+    def test_progress_says_how_long_it_will_take_while_the_reference_is_made_too(self):
+        result = run("chart", "builtin:columns:2", "--size", "16x16", "--methods", "pcf", "--sweep", "none", "--repeat", 1,
+                     "-o", self.directory.parent / "progress")
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertRegex(result.stderr, r"(?m)^chart: \d0 %, about (\d+ min )?\d+ s left, builtin:columns:2 reference \d+ of 16$")
+        self.assertRegex(result.stderr, r"about .* left, builtin:columns:2 pcf")
+
     def test_points_that_a_point_light_makes_equal_are_measured_once(self):
         scene = self.directory.parent / "point.obj"
         scene.write_text("v -4 0 -4\nv -4 0 4\nv 4 0 4\nv -1 1 -1\nv -1 1 1\nv 1 1 1\nf 1 2 3\nf 4 5 6\n",
@@ -217,7 +282,7 @@ class Chart(unittest.TestCase):
         points = json.loads((directory / "chart.json").read_text(encoding="utf-8"))["points"]
         self.assertEqual([point["id"] for point in points], ["exact n=1", "pcf n=1", "pcf n=1 map.resolution=64"])
 
-    def test_the_plots_name_every_method_and_point(self):
+    def test_the_plots_name_every_method_and_the_points_of_the_front(self):
         if subprocess.run([sys.executable, "-c", "import matplotlib"], capture_output=True, check=False).returncode != 0:
             self.skipTest("no matplotlib")
         result = run(SOURCES / "bench/plot_chart.py", self.directory / "chart.json", "-o", self.directory / "plot",
@@ -226,10 +291,10 @@ class Chart(unittest.TestCase):
         self.assertTrue((self.directory / "plot.png").read_bytes().startswith(b"\x89PNG"))
         drawing = xml.etree.ElementTree.parse(self.directory / "plot.svg")
         texts = ["".join(element.itertext()).strip() for element in drawing.iter() if element.tag.endswith("}text")]
-        for text in ("columns", "exact", "pcf", "exact 16"):
-            self.assertIn(text, texts)
-        for label in ("default", "resolution 64", "resolution 256"):
-            self.assertTrue(any(text.endswith(label) for text in texts), label)
+        front = {f'{p["method"]} {p["label"]}' for p in report_parts.pareto_front(self.chart["points"])}
+        self.assertLessEqual({"columns", "exact", "pcf", "exact 16"} | front, set(texts))
+        others = {p["label"] for p in self.chart["points"]} | {f'{p["method"]} {p["label"]}' for p in self.chart["points"]}
+        self.assertEqual((others - front) & set(texts), set())
 
     def test_the_report_needs_no_network_and_holds_data_and_pictures(self):
         page = self.report.read_text(encoding="utf-8")
@@ -247,17 +312,20 @@ class Chart(unittest.TestCase):
         self.assertEqual(base64.b64decode(download), (self.directory / "chart.csv").read_bytes())
 
     def test_the_report_works_in_a_browser(self):
-        if browser.program() is None:
-            self.skipTest("no chromium on PATH")
-        seen = browser.look(self.report, ACTIONS)
+        browser.require(self)
+        seen = browser.look(self.report, f"const TIES = {json.dumps(TIES)};" + ACTIONS)
         self.assertEqual(seen["errors"], [])
         self.assertEqual(seen["points"], COUNT)
         self.assertGreater(seen["canvas"], 0)
         self.assertEqual(seen["line"], 3)
         self.assertAlmostEqual(seen["wipe"], 0.9, places=2)
-        self.assertEqual(seen["wiped"][:3], [0, 170, 0])
-        self.assertGreater(seen["zoom"], 1)
-        self.assertTrue(seen["zoomed"])
+        self.assertEqual(seen["wiped"], [0, 170, 0])
+        self.assertEqual(seen["zoom"], [1.25, 1.25 ** 2, 1.25 ** 3])
+        self.assertEqual(seen["zoomed"], [3, 3, 3])
+        self.assertEqual(seen["legend"], [[255, 0, 0], [255, 255, 255], [0, 0, 255]])  # A lighter, equal, darker
+        self.assertEqual(seen["sides"], [[150] * 3, [50] * 3, [100] * 3])  # A left of the line, B right of it
+        self.assertEqual(seen["front"], [point["id"] for point in report_parts.pareto_front(self.chart["points"])])
+        self.assertEqual(seen["ties"], [point["id"] for point in report_parts.pareto_front(tied_points())])
         self.assertEqual(seen["difference"], "A - B")
         self.assertTrue(seen["flickers"])
         self.assertEqual(seen["tip"], "data:image/png;base64,")

@@ -7,12 +7,14 @@ Usage: test_max_error.py HALFSHADE [unittest arguments]
 import json
 import os
 import pathlib
+import shlex
 import subprocess
 import sys
 import tempfile
 import unittest
 
 PROGRAM = os.path.abspath(sys.argv.pop(1)) if len(sys.argv) > 1 else "halfshade"
+SOURCES = pathlib.Path(__file__).resolve().parents[2]
 OK, DIFFERENT, USAGE = range(3)
 
 
@@ -42,7 +44,7 @@ class MaxError(unittest.TestCase):
 
     def test_lights_of_all_kinds(self):
         for view in ("disk", "sphere", "polygon", "ellipsoid", "two"):
-            file = pathlib.Path(__file__).parents[2] / "docs/views" / f"{view}.view.json"
+            file = SOURCES / "docs/views" / f"{view}.view.json"
             with self.subTest(view=view):
                 for light in stats_of("builtin:bars", "1/32", "--view", str(file), "--size", "24x24", "--verify", "100"):
                     self.assertEqual(light["verify"]["violations"], 0)
@@ -77,17 +79,57 @@ class Recommend(unittest.TestCase):
         self.assertIn(run.returncode, (OK, DIFFERENT), run.stderr)
         report = json.loads(run.stdout)
         self.assertEqual(report["schema"], "halfshade.recommend/1")
-        for light in report["lights"]:
-            keeping = [p for p in light["points"] if p.get("keeps_goal")]
-            self.assertTrue(keeping)
-            cheapest = min(keeping, key=lambda p: p["shadow_ms"])
-            self.assertEqual(light["recommended"], cheapest["setting"])
-            self.assertTrue(all(p["max"] <= 1 / 32 for p in keeping))
-            self.assertEqual({p["setting"] for p in light["points"]} & {"--max-error 1/32"}, {"--max-error 1/32"})
+        light, = report["lights"]
+        keeping = [p for p in light["points"] if p.get("keeps_goal")]
+        self.assertTrue(keeping)
+        self.assertEqual(report["recommended"]["setting"], min(keeping, key=lambda p: p["shadow_ms"])["setting"])
+        self.assertTrue(all(p["max"] <= 1 / 32 for p in keeping))
+        self.assertIn("--max-error 1/32", {p["setting"] for p in light["points"]})
+
+    def test_the_printed_line_keeps_the_goal_under_all_lights_with_all_options(self):
+        given = ["--view", str(SOURCES / "docs/views/two.view.json"), "--size", "32x32", "--crop", "2,30,0,32", "--seed", "3"]
+        run = halfshade("recommend", "builtin:columns:2", *given, "--max-error", "1/32", "--repeat", "1", "--quiet")
+        self.assertEqual(run.returncode, OK, run.stderr)
+        line, = (text for text in run.stdout.splitlines() if text.startswith("recommended: "))
+        command = shlex.split(line.removeprefix("recommended: "))
+        self.assertEqual(command[:len(given) + 3], ["halfshade", "render", "builtin:columns:2", *given])
+        with tempfile.TemporaryDirectory() as directory:
+            ours, reference = (os.path.join(directory, name) for name in ("ours.exr", "reference.exr"))
+            self.assertEqual(halfshade(*command[1:], "-o", ours, "--quiet").returncode, OK)
+            goal = ["--max-error", "1/512"]
+            self.assertEqual(halfshade("render", "builtin:columns:2", *given, *goal, "-o", reference, "--quiet").returncode, OK)
+            # Visibility of each light is among the values.
+            compared = halfshade("compare", ours, reference, "--max-error", str(1 / 32 + 1 / 512))
+        self.assertEqual(compared.returncode, OK, compared.stdout + compared.stderr)
+
+    def test_one_setting_is_named_that_is_cheapest_for_all_lights_together(self):
+        run = halfshade("recommend", "builtin:columns:2", "--view", str(SOURCES / "docs/views/two.view.json"), "--max-error",
+                        "1/32", "--size", "32x32", "--repeat", "1", "--json", "--quiet")
+        self.assertEqual(run.returncode, OK, run.stderr)
+        report = json.loads(run.stdout)
+        self.assertEqual(len(report["lights"]), 2)
+        sums = {}
+        for points in zip(*(light["points"] for light in report["lights"])):
+            if all(p.get("keeps_goal") for p in points):
+                sums[points[0]["setting"]] = sum(p["shadow_ms"] for p in points)
+        setting = min(sums, key=sums.get)
+        self.assertEqual(report["recommended"]["setting"], setting)
+        self.assertAlmostEqual(report["recommended"]["shadow_ms"], sums[setting])
+
+    def test_what_render_refuses_is_not_recommended(self):
+        run = halfshade("recommend", "builtin:glass:8", "--max-error", "1/32", "--size", "24x24", "--repeat", "1", "--json",
+                        "--quiet")
+        self.assertIn(run.returncode, (OK, DIFFERENT), run.stderr)
+        adaptive, = (p for p in json.loads(run.stdout)["lights"][0]["points"] if p["setting"] == "--max-error 1/32")
+        self.assertIn("translucent", adaptive["reason"])
+        self.assertNotIn("keeps_goal", adaptive)
 
     def test_bad_options(self):
         self.assertEqual(halfshade("recommend", "builtin:sphere", "--max-error", "2").returncode, USAGE)
         self.assertEqual(halfshade("recommend", "builtin:sphere", "--repeat", "0").returncode, USAGE)
+        for chosen in (["--method", "afsm"], ["--pattern", "uniform"], ["--light-samples", "64"], ["--sets", "4"]):
+            with self.subTest(chosen=chosen):
+                self.assertEqual(halfshade("recommend", "builtin:sphere", *chosen).returncode, USAGE)
 
 
 class Shortcuts(unittest.TestCase):
@@ -98,6 +140,10 @@ class Shortcuts(unittest.TestCase):
         self.assertTrue(shortcuts["back-face-only casters"]["on"])
         self.assertGreater(shortcuts["back-face-only casters"]["gain"], 0)
         self.assertTrue(shortcuts["no alpha path"]["on"])
+        plain = halfshade("render", "builtin:sphere", "--size", "24x24", "--stats", "--quiet").stdout
+        self.assertIn("--measure-shortcuts adds what each gains", plain)
+        measured = halfshade("render", "builtin:sphere", "--size", "24x24", "--measure-shortcuts", "--quiet").stdout
+        self.assertNotIn("--measure-shortcuts", measured)
         fence = halfshade("render", "builtin:fence", "--size", "24x24", "--stats", "--json", "-", "--quiet")
         shortcuts = {s["name"]: s for s in json.loads(fence.stdout)["lights"][0]["shortcuts"]}
         self.assertFalse(shortcuts["no alpha path"]["on"])

@@ -5,9 +5,13 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <tbb/task_scheduler_observer.h>
+
 #include <condition_variable>
 #include <future>
+#include <map>
 #include <mutex>
+#include <thread>
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
@@ -110,32 +114,73 @@ TEST_CASE("S30: flush-to-zero and directed rounding around a call change no bit 
 
 namespace {
 
+/// How many threads were at work at once; one that is at two pieces of work, nested, counts once.
+class ThreadsAtWork {
+ public:
+  void enter() {
+    const std::lock_guard lock(mutex_);
+    ++depth_[std::this_thread::get_id()];
+    most_ = std::max(most_, depth_.size());
+  }
+  void leave() {
+    const std::lock_guard lock(mutex_);
+    const auto at = depth_.find(std::this_thread::get_id());
+    if (--at->second == 0) depth_.erase(at);
+  }
+  std::size_t most() const { return most_; }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::thread::id, int> depth_;
+  std::size_t most_ = 0;
+};
+
+/// Those of an arena, whoever's loops they run.
+class ThreadsOfArena : public tbb::task_scheduler_observer {
+ public:
+  explicit ThreadsOfArena(tbb::task_arena& arena) : task_scheduler_observer(arena) { observe(true); }
+  ~ThreadsOfArena() override { observe(false); }
+  void on_scheduler_entry(bool) override { threads_.enter(); }
+  void on_scheduler_exit(bool) override { threads_.leave(); }
+  std::size_t most() const { return threads_.most(); }
+
+ private:
+  ThreadsAtWork threads_;
+};
+
 /// `threads` host threads, each with loops of its own around our calls, `rounds` times.
 void nest_pools(std::size_t threads, int rounds) {
-  const tbb::global_control more(tbb::global_control::max_allowed_parallelism, 8);
+  constexpr std::size_t kMostThreads = 8, kOfArena = 2;
+  const tbb::global_control more(tbb::global_control::max_allowed_parallelism, kMostThreads);
   EmbedScene s(16);
   const Ground ground(32);
   const Light light = frame_light();
   const ShadowSolver solver({.light_sample_count = 64});
   const std::vector<std::uint64_t> expected = solve(solver, s.scene, ground.view(), light).masks;
-  std::atomic<int> wrong{0}, solved{0};
+  std::atomic<int> wrong{0}, solved{0}, crowded{0};
+  ThreadsAtWork at_work;
   const auto host_thread = [&] {
     for (int round = 0; round < rounds; ++round) {
       tbb::parallel_for(0, 4, [&](int) {
+        at_work.enter();
         Workspace workspace;
         tbb::parallel_for(
             0, 2, [&](int) {}, tbb::simple_partitioner());
         const Solved result = solve(solver, s.scene, ground.view(), {&light, 1}, workspace);
         wrong += result.masks != expected;
         ++solved;
+        at_work.leave();
       });
       // The same from inside an arena of its own, with a workspace that the thread keeps.
       thread_local Workspace kept;
-      tbb::task_arena arena(2);
+      tbb::task_arena arena(static_cast<int>(kOfArena));
+      arena.initialize();
+      const ThreadsOfArena in_arena(arena);
       arena.execute([&] {
         wrong += solve(solver, s.scene, ground.view(), {&light, 1}, kept).masks != expected;
         ++solved;
       });
+      crowded += in_arena.most() > kOfArena || in_arena.most() < 1;
     }
   };
   std::vector<std::future<void>> running;
@@ -143,6 +188,9 @@ void nest_pools(std::size_t threads, int rounds) {
   for (std::future<void>& thread : running) thread.get();
   CHECK(wrong == 0);
   CHECK(solved == static_cast<int>(threads) * rounds * 5);
+  CHECK(crowded == 0);
+  // The host's own, and the workers that may be beside one of them.
+  CHECK(at_work.most() <= threads + kMostThreads - 1);
 }
 
 }  // namespace

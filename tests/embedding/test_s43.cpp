@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <ctime>
+#include <thread>
 
 #include "support/counted_new.h"
 #include "support/embed_scene.h"
@@ -159,7 +160,7 @@ TEST_CASE("S43: memory runs out at each of the first 500 allocations") {
       expected = masks;
     }
     REQUIRE(blocked_bits(expected) > 1000);
-    int failures = 0;
+    int failures = 0, kept = 0;  // kept: calls after which not as many bytes are live as before
     for (std::uint64_t n = 1; n <= 500; ++n) {
       CAPTURE(n);
       masks.assign(masks.size(), 0);
@@ -186,9 +187,11 @@ TEST_CASE("S43: memory runs out at each of the first 500 allocations") {
       }
       CHECK(equal);
       CHECK(other == "");
-      if (executor == Executor::kSerial) CHECK(allocations_now().live == before);
+      kept += allocations_now().live != before;
     }
     MESSAGE(failures, " of 500 failed");
     CHECK(failures > 100);
+    // TBB's threads keep a few bytes of their own, once each; what we lose we would lose at every failure.
+    CHECK(kept <= (executor == Executor::kSerial ? 0 : 2 * static_cast<int>(std::thread::hardware_concurrency())));
   }
 }

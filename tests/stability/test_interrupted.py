@@ -219,8 +219,9 @@ class S41(Interrupted):
 
 
 class S42(Interrupted):
-    ROUNDS = 8
+    ROUNDS = 12  # with four each of the two other tests, 20
     LIMIT_MS = 250.0
+    late = []  # milliseconds of all tests; one may be, since a busy machine can delay any process
 
     def interrupt(self, arguments, after, signals=1):
         """(exit code, milliseconds from the last signal to the end), or None if the program was through before."""
@@ -249,16 +250,16 @@ class S42(Interrupted):
             time.sleep(0.002)
 
     def check(self, arguments, seconds, signals=1):
-        """Interrupts at a random time; late ends are tried again, since a busy machine can delay any process."""
-        for _ in range(4):
-            result = self.interrupt(arguments, self.generator.random() * seconds, signals)
-            if result is None:
-                return None
-            self.assertEqual(result[0], INTERRUPTED)
-            self.assertEqual([name for name in names(self.directory) if ".halfshade-" in name], [])
-            if result[1] <= self.LIMIT_MS:
-                return result[1]
-        self.fail(f"ended {result[1]:.0f} ms after the signal, allowed are {self.LIMIT_MS:.0f}")
+        """Interrupts at a random time: milliseconds to the end, or None if the program was through before."""
+        result = self.interrupt(arguments, self.generator.random() * seconds, signals)
+        if result is None:
+            return None
+        self.assertEqual(result[0], INTERRUPTED)
+        self.assertEqual([name for name in names(self.directory) if ".halfshade-" in name], [])
+        if result[1] > self.LIMIT_MS:
+            self.late.append(result[1])
+        self.assertLessEqual(len(self.late), 1, f"milliseconds after the signal; allowed are {self.LIMIT_MS:.0f}: {self.late}")
+        return result[1]
 
     def test_an_interrupted_render_stops_soon_and_can_go_on(self):
         self.generator = random.Random(42)
@@ -290,9 +291,12 @@ class S42(Interrupted):
 
     def test_nothing_is_waited_for_while_a_scene_is_made(self):
         self.generator = random.Random(44)
-        for _ in range(4):
-            self.check(("builtin:hairball:20000", "--size", "64x64", "--quiet", "-o", self.picture), 0.5)
+        stopped = 0
+        while stopped < 4:
+            taken = self.check(("builtin:hairball:20000", "--size", "64x64", "--quiet", "-o", self.picture), 0.5)
+            self.picture.unlink(missing_ok=True)
             self.assertEqual(names(self.directory), [])
+            stopped += taken is not None
 
 
 if __name__ == "__main__":
