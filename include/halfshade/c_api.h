@@ -137,8 +137,8 @@ typedef struct halfshade_light {
   double axes[3][3];
   halfshade_points points;
   int two_sided;
-  float emission[3]; /* linear RGB */
-  /* RECTANGLE: replaces emission unless NULL; [height][width][3] linear RGB, row 0 is the edge at +v / 2. */
+  float emission[3]; /* linear RGB >= 0 */
+  /* RECTANGLE: replaces emission unless NULL; [height][width][3] linear RGB >= 0, row 0 is the edge at +v / 2. */
   const float* emission_image;
   uint32_t image_width, image_height;
   double angular_diameter_deg; /* SUN: 0 < angle <= 60 */
