@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/reuse.h"
 
 namespace halfshade {
 namespace {
@@ -48,18 +49,25 @@ std::size_t bin_of(const Item& item, const Bounds& centers, int axis) {
   return std::min(kBins - 1, static_cast<std::size_t>(place));
 }
 
+/// visit(item) for all, in order; the call can be stopped meanwhile.
+template <class Items, class Visit>
+void for_items(const Items& items, const Visit& visit) {
+  checked_ranges(items.size(), 16384, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) visit(items[i]);
+  });
+}
+
 Split find_split(std::span<const Item> items, const Bounds& centers) {
   Split best;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(centers.high[axis] > centers.low[axis])) continue;
-    check_run();
     std::array<Bounds, kBins> bounds;
     std::array<std::size_t, kBins> counts{};
-    for (const Item& item : items) {
+    for_items(items, [&](const Item& item) {
       const std::size_t bin = bin_of(item, centers, axis);
       bounds[bin].add(item.bounds);
       ++counts[bin];
-    }
+    });
     std::array<float, kBins> right_cost{};
     Bounds right;
     std::size_t right_count = 0;
@@ -80,22 +88,32 @@ Split find_split(std::span<const Item> items, const Bounds& centers) {
   return best;
 }
 
-std::unique_ptr<Branch> build(std::span<Item> items, std::size_t begin) {
+/// As std::stable_partition, which would get itself new scratch each time; the number of items for which `goes_left`.
+template <class GoesLeft>
+std::size_t partition(std::span<Item> items, std::span<Item> scratch, const GoesLeft& goes_left) {
+  std::size_t left = 0, right = 0;
+  for_items(items, [&](const Item& item) { (goes_left(item) ? items[left++] : scratch[right++]) = item; });
+  const std::span<Item> rest = items.subspan(left);
+  checked_ranges(right, 16384, [&](std::size_t begin, std::size_t end) {
+    std::copy_n(scratch.begin() + static_cast<std::ptrdiff_t>(begin), end - begin,
+                rest.begin() + static_cast<std::ptrdiff_t>(begin));
+  });
+  return left;
+}
+
+std::unique_ptr<Branch> build(std::span<Item> items, std::span<Item> scratch, std::size_t begin) {
   auto branch = std::make_unique<Branch>();
   branch->begin = begin, branch->end = begin + items.size();
   Bounds centers;
-  for (const Item& item : items) branch->bounds.add(item.bounds), centers.add(item.center);
-  check_run();
+  for_items(items, [&](const Item& item) { branch->bounds.add(item.bounds), centers.add(item.center); });
   if (items.size() <= kWidth) return branch;
   const Split split = find_split(items, centers);
-  auto middle = items.begin() + static_cast<std::ptrdiff_t>(items.size() / 2);  // all centres equal: halve the run
+  std::size_t count = items.size() / 2;  // all centres equal: halve the run
   if (split.axis >= 0) {
-    middle = std::stable_partition(items.begin(), items.end(),
-                                   [&](const Item& item) { return bin_of(item, centers, split.axis) < split.bin; });
+    count = partition(items, scratch, [&](const Item& item) { return bin_of(item, centers, split.axis) < split.bin; });
   }
-  const auto count = static_cast<std::size_t>(middle - items.begin());
-  const auto left = [&] { branch->left = build(items.first(count), begin); };
-  const auto right = [&] { branch->right = build(items.subspan(count), begin + count); };
+  const auto left = [&] { branch->left = build(items.first(count), scratch.first(count), begin); };
+  const auto right = [&] { branch->right = build(items.subspan(count), scratch.subspan(count), begin + count); };
   if (items.size() >= kParallelFrom) {
     parallel_pair(left, right);
   } else {
@@ -270,7 +288,7 @@ void trace_groups(BlockerTree& tree) {
     node.first_edge = edges, node.first_vertex = vertices;
     edges += node.edges, vertices += node.vertices;
   }
-  tree.edges.resize(edges), tree.vertices.resize(vertices);
+  resize_checked(tree.edges, edges), resize_checked(tree.vertices, vertices);
   for_groups([&tree](const BlockerTree::Node& node, const GroupMesh& group) {
     std::copy_n(group.edge.begin(), group.edges, tree.edges.begin() + node.first_edge);
     std::copy_n(group.vertex.begin(), group.vertices, tree.vertices.begin() + node.first_vertex);
@@ -318,7 +336,8 @@ std::size_t BlockerTree::bytes() const {
 }
 
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
-  std::vector<Item> items(mesh.triangles.size());
+  std::vector<Item> items, scratch;
+  resize_checked(items, mesh.triangles.size()), resize_checked(scratch, items.size());
   parallel_ranges(items.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
       items[i].triangle = static_cast<std::uint32_t>(i);
@@ -328,23 +347,31 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
   });
   tree.nodes.clear(), tree.leaves.clear(), tree.order.clear();
   if (items.empty()) return;
-  flatten(*build(items, 0), tree);
-  tree.order.reserve(items.size());
-  for (const Item& item : items) tree.order.push_back(item.triangle);
+  const std::unique_ptr<Branch> root = build(items, scratch, 0);
+  tree.leaves.reserve(root->leaves);
+  flatten(*root, tree);
+  resize_checked(tree.order, items.size());
+  for (std::size_t i = 0; i < items.size(); ++i) tree.order[i] = items[i].triangle;
   place_blockers(mesh, tree);
 }
 
 void place_blockers(const LatticeMesh& mesh, BlockerTree& tree) {
-  tree.place.resize(tree.order.size());
+  resize_checked(tree.place, tree.order.size());
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) fill_lanes(mesh, tree, static_cast<std::uint32_t>(i));
   });
   trace_groups(tree);
 }
 
+void copy_tree(const BlockerTree& from, BlockerTree& to) {
+  copy_checked(from.order, to.order), copy_checked(from.place, to.place);
+  copy_checked(from.leaves, to.leaves), copy_checked(from.nodes, to.nodes);
+  copy_checked(from.edges, to.edges), copy_checked(from.vertices, to.vertices);
+}
+
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
                         BlockerTree& tree) {
-  tree.blockers.resize(tree.order.size());
+  resize_checked(tree.blockers, tree.order.size());
   std::vector<Bounds>&leaf_box = tree.leaf_box, &node_box = tree.node_box;
   leaf_box.resize(tree.leaves.size());
   node_box.assign(tree.nodes.size(), {});
@@ -354,18 +381,24 @@ void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, c
       leaf_box[i] = leaf_bounds(frame, tree.leaves[i]);
     }
   });
+  const auto for_leaves = [&tree](const auto& visit) {
+    checked_ranges(tree.leaves.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i != end; ++i) visit(tree.leaves[i]);
+    });
+  };
   std::size_t perforated = 0;
-  for (const BlockerTree::Leaf& leaf : tree.leaves)
-    perforated += static_cast<std::size_t>(std::popcount(leaf.perforated));
+  for_leaves(
+      [&](const BlockerTree::Leaf& leaf) { perforated += static_cast<std::size_t>(std::popcount(leaf.perforated)); });
   tree.alpha.clear();
   tree.alpha.reserve(perforated);  // blockers point into it
-  for (const BlockerTree::Leaf& leaf : tree.leaves) {
+  for_leaves([&](const BlockerTree::Leaf& leaf) {
     for (std::uint32_t rest = leaf.perforated; rest != 0; rest &= rest - 1) {
       Blocker& b = tree.blockers[leaf.first + static_cast<std::uint32_t>(std::countr_zero(rest))];
       b.alpha = &tree.alpha.emplace_back(make_alpha_triangle(mesh, b.triangle));
     }
-  }
+  });
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
+    if (n % 4096 == 0) check_run();
     BlockerTree::Node& node = tree.nodes[n];
     for (std::uint32_t i = 0; i < kWidth; ++i) {
       Bounds box;  // empty for unused children: no shaft meets it

@@ -82,6 +82,9 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);
 /// built.
 void place_blockers(const LatticeMesh& mesh, BlockerTree& tree);
 
+/// All that does not depend on a light; what `to` holds beside it stays as scratch.
+void copy_tree(const BlockerTree& from, BlockerTree& to);
+
 /// Blockers and bounds for a light.
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
                         BlockerTree& tree);

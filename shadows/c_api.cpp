@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "shadows/c_convert.h"
+#include "shadows/view_access.h"
 
 using namespace halfshade;
 
@@ -306,6 +307,19 @@ halfshade_status halfshade_scene_reach(halfshade_context* context, const halfsha
   });
 }
 
+halfshade_status halfshade_scene_to_world(halfshade_context* context, const halfshade_scene* scene,
+                                          const halfshade_points* local, double* world) {
+  return guarded(context, [&] {
+    const ShadowScene& from = checked(scene).value;
+    const PointView points = to_view(checked_out(local, "local"), "local");
+    if (points.count != 0) checked_out(world, "world");
+    for (std::size_t i = 0; i < points.count; ++i) {
+      const dvec3 p = from.to_world(element(points, i));
+      for (std::size_t axis = 0; axis < 3; ++axis) world[3 * i + axis] = p[static_cast<int>(axis)];
+    }
+  });
+}
+
 halfshade_status halfshade_scene_get_stats(halfshade_context* context, const halfshade_scene* scene,
                                            halfshade_scene_stats* stats) {
   return guarded(context, [&] {
@@ -432,7 +446,8 @@ halfshade_status halfshade_gbuffer_get_view(halfshade_context* context, const ha
                   .position = &g.position[0].x,
                   .geometric_normal = &g.geometric_normal[0].x,
                   .albedo = &g.albedo[0].x,
-                  .depth = g.depth.data()},
+                  .depth = g.depth.data(),
+                  .shading_normal = &g.shading_normal[0].x},
                  "view");
   });
 }

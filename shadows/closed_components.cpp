@@ -23,6 +23,7 @@ std::vector<std::uint32_t> weld(const std::vector<vec3>& positions) {
   };
   parallel_sort(order, before);
   for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i % 65536 == 0) check_run();
     const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
     number[order[i]] = same ? number[order[i - 1]] : static_cast<std::uint32_t>(i);
   }
@@ -33,7 +34,7 @@ std::vector<EdgeUse> collect_edges(const LatticeMesh& mesh, const std::vector<st
   std::vector<EdgeUse> uses;
   uses.reserve(mesh.triangles.size() * 3);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (t % 65536 == 0) check_run();
+    if (t % 16384 == 0) check_run();
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t a = number[mesh.triangles[t][k]], b = number[mesh.triangles[t][(k + 1) % 3]];
       if (a == b) continue;
@@ -75,22 +76,27 @@ ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<Edg
   for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
     for (const EdgeUse& use : edge) sets.join(edge[0].triangle, use.triangle);
   });
+  const auto for_triangles = [count](const auto& visit) {
+    checked_ranges(count, 65536, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t != end; ++t) visit(static_cast<std::uint32_t>(t));
+    });
+  };
   std::vector<std::uint8_t> open(count, 0);  // [root]
   for_each_edge(uses, [&](std::span<const EdgeUse> edge) {
     std::int32_t balance = 0;
     for (const EdgeUse& use : edge) balance += use.direction;
     if (balance != 0) open[sets.find(edge[0].triangle)] = 1;
   });
-  for (std::uint32_t t = 0; t < count; ++t) {
+  for_triangles([&](std::uint32_t t) {
     if (mesh.alpha_map(t) != kNone) open[sets.find(t)] = 1;
-  }
+  });
   ClosedComponents result;
   result.of_triangle.assign(count, kNone);
   std::vector<std::uint32_t> box_of_root(count, kNone);
-  for (std::uint32_t t = 0; t < count; ++t) {
+  for_triangles([&](std::uint32_t t) {
     const std::uint32_t root = sets.find(t);
     result.components += root == t;
-    if (open[root]) continue;
+    if (open[root]) return;
     const auto corners = mesh.corners(t);
     if (box_of_root[root] == kNone) {
       box_of_root[root] = static_cast<std::uint32_t>(result.boxes.size());
@@ -99,7 +105,7 @@ ClosedComponents find_closed_components(const LatticeMesh& mesh, std::vector<Edg
     result.of_triangle[t] = box_of_root[root];
     ClosedComponents::Box& box = result.boxes[box_of_root[root]];
     for (const vec3& p : corners) box = {glm::min(box.low, p), glm::max(box.high, p)};
-  }
+  });
   if (edges != nullptr) *edges = std::move(uses);
   if (welded != nullptr) *welded = std::move(number);
   return result;
@@ -131,9 +137,12 @@ void apply_certificates(const LatticeMesh& mesh, const ReceiverArray& receivers,
                         KernelSamples& samples, ShadowStats& stats) {
   use_certificate(closed, samples);
   withdraw_certificates(mesh, receivers, samples);
-  for (const std::uint32_t c : closed.of_triangle) {
-    stats.certified_blockers += c != kNone && samples.closed_usable[c] != 0;
-  }
+  checked_ranges(closed.of_triangle.size(), 65536, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t != end; ++t) {
+      const std::uint32_t c = closed.of_triangle[t];
+      stats.certified_blockers += c != kNone && samples.closed_usable[c] != 0;
+    }
+  });
 }
 
 void certify(const LatticeMesh& mesh, const ReceiverArray& receivers, const ShadowConfig& config,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rasterizer/core/fp_environment.h"
 #include "shadows/light_samples.h"
 #include "shadows/sample_patterns.h"
 
@@ -37,17 +38,46 @@ dvec3 mean_over(const EmissionImage& image, const Range& x, const Range& y) {
   return sum / area;
 }
 
-}  // namespace
-
-std::vector<vec3> sample_emission(const EmissionImage& image, std::span<const dvec2> st) {
-  if (image.empty()) throw Error(ErrorCode::kUsage, "emission: the image is empty");
+/// Weights of one set behind those that are there. The image is known to be a good one.
+void add_weights(const EmissionImage& image, std::span<const dvec2> st, std::vector<vec3>& weights) {
   const double count = static_cast<double>(st.size()), half = 0.5 / std::sqrt(count);
-  std::vector<vec3> weights;
-  weights.reserve(st.size());
   for (const dvec2& p : st) {
     const Range x = range_around(p.x, half, image.width), y = range_around(1.0 - p.y, half, image.height);
     weights.emplace_back(mean_over(image, x, y) / count);
   }
+}
+
+void check_image(const EmissionImage& image) {
+  if (image.empty()) throw Error(ErrorCode::kUsage, "emission: the image is empty");
+  const std::string fault = !size_fault(image).empty() ? size_fault(image) : texel_fault(image);
+  if (!fault.empty()) throw Error(ErrorCode::kBadInput, "emission: " + fault);
+}
+
+}  // namespace
+
+std::string size_fault(const EmissionImage& image) {
+  const std::uint64_t wanted = std::uint64_t{image.width} * image.height;
+  if (wanted != 0 && image.rgb.size() == wanted) return {};
+  return "the image has " + std::to_string(image.rgb.size()) + " texels for " + std::to_string(image.width) + " x " +
+         std::to_string(image.height);
+}
+
+std::string texel_fault(const EmissionImage& image) {
+  const auto bad = std::find_if_not(image.rgb.begin(), image.rgb.end(), is_emission);
+  if (bad == image.rgb.end()) return {};
+  return "texel " + std::to_string(bad - image.rgb.begin()) + " of the image is negative or not finite";
+}
+
+std::vector<vec3> sample_emission(const EmissionImage& image, std::span<const dvec2> st) {
+  const FpEnvironment environment;
+  check_image(image);
+  for (std::size_t i = 0; i < st.size(); ++i) {
+    if (st[i].x >= 0.0 && st[i].x <= 1.0 && st[i].y >= 0.0 && st[i].y <= 1.0) continue;
+    throw Error(ErrorCode::kBadInput, "emission: sample " + std::to_string(i) + " is not within 0..1");
+  }
+  std::vector<vec3> weights;
+  weights.reserve(st.size());
+  add_weights(image, st, weights);
   return weights;
 }
 
@@ -55,6 +85,7 @@ std::vector<vec3> sample_emission(const Light& light, const ShadowConfig& config
   if (light.shape != LightShape::kRectangle) {
     throw Error(ErrorCode::kUsage, "light '" + light.name + "': only rectangles have emission images");
   }
+  const FpEnvironment environment;
   LightSamples samples;
   samples.count = config.light_sample_count;
   samples.sets = number_of_sets(light, config);
@@ -63,16 +94,18 @@ std::vector<vec3> sample_emission(const Light& light, const ShadowConfig& config
 }
 
 std::vector<vec3> sample_emission(const EmissionImage& image, const LightSamples& samples) {
+  const FpEnvironment environment;
+  check_image(image);
   std::vector<vec3> weights;
+  weights.reserve(samples.st.size());
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    const std::span<const dvec2> st = std::span(samples.st).subspan(std::size_t{set} * samples.count, samples.count);
-    const std::vector<vec3> part = sample_emission(image, st);
-    weights.insert(weights.end(), part.begin(), part.end());
+    add_weights(image, std::span(samples.st).subspan(std::size_t{set} * samples.count, samples.count), weights);
   }
   return weights;
 }
 
 vec3 weighted_visibility(std::span<const std::uint64_t> mask, std::span<const vec3> weights) {
+  const FpEnvironment environment;
   dvec3 sum(0.0);
   for (std::size_t i = 0; i < weights.size(); ++i) {
     if (!((mask[i / 64] >> (i % 64)) & 1)) sum += dvec3(weights[i]);

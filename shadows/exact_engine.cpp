@@ -107,7 +107,7 @@ void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, const
   side.fitted = false;
   if (blockers.tree != nullptr && side.tree_version != blockers.tree_version) {
     side.tree_version = 0;
-    side.tree = *blockers.tree;
+    copy_tree(*blockers.tree, side.tree);
     side.tree_version = blockers.tree_version;
   }
   refit_blocker_tree(blockers.mesh, samples, frame, side.tree);

@@ -1,6 +1,9 @@
 // Where the samples of an area light lie: a pure function of (light, pattern, count, sets, seed, frame).
 #pragma once
 
+#include <limits>
+#include <string>
+
 #include "halfshade/shadows.h"
 #include "rasterizer/core/lattice.h"
 
@@ -49,6 +52,18 @@ void check_light(const Light& light, const ShadowConfig& config);
 /// 1 for points, their number for explicit samples, else what `config` asks for. Throws as make_light_samples where
 /// explicit samples are none or too many.
 std::uint32_t samples_of(const Light& light, const ShadowConfig& config);
+
+/// May a light emit this? Finite, and no colour below 0.
+inline bool is_emission(const vec3& c) {
+  constexpr float kMost = std::numeric_limits<float>::max();
+  return c.x >= 0.0f && c.x <= kMost && c.y >= 0.0f && c.y <= kMost && c.z >= 0.0f && c.z <= kMost;
+}
+
+/// What is wrong with the image, for a message, or "": without as many texels as its width and height say, at least
+/// one.
+std::string size_fault(const EmissionImage& image);
+/// The same: with a texel that no light may emit.
+std::string texel_fault(const EmissionImage& image);
 
 /// Weights of the samples of every set, [set][sample] (halfshade/emission.h).
 std::vector<vec3> sample_emission(const EmissionImage& image, const LightSamples& samples);

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "rasterizer/core/parallel.h"
+#include "rasterizer/core/reuse.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/scene_store.h"
 #include "shadows/view_access.h"
@@ -67,10 +68,10 @@ void lay_out(SceneImpl& scene) {
     scene.attributes.materials.push_back(material);
   }
   scene.mesh.scene = &scene.attributes;
-  scene.mesh.positions.resize(vertices);
-  scene.mesh.triangles.resize(triangles);
-  scene.attributes.triangle_materials.resize(triangles);
-  scene.attributes.triangle_uvs.resize(textured ? triangles : 0);
+  resize_checked(scene.mesh.positions, vertices);
+  resize_checked(scene.mesh.triangles, triangles);
+  resize_checked(scene.attributes.triangle_materials, triangles);
+  resize_checked(scene.attributes.triangle_uvs, textured ? triangles : 0);
   for (std::size_t i = 0; i < scene.meshes.size(); ++i)
     place_mesh(scene.meshes[i], static_cast<std::uint32_t>(i), scene);
   scene.parts_are_current = false;
@@ -100,8 +101,8 @@ bool still_welded(const StoredMesh& mesh, std::span<const vec3> positions) {
 
 MeshCertificate make_certificate(const StoredMesh& mesh, std::span<const vec3> positions) {
   LatticeMesh alone;
-  alone.positions.assign(positions.begin(), positions.end());
-  alone.triangles = mesh.triangles;
+  copy_checked(positions, alone.positions);
+  copy_checked(mesh.triangles, alone.triangles);
   MeshCertificate result;
   std::vector<std::uint32_t> number;
   ClosedComponents closed = find_closed_components(alone, nullptr, &number);
@@ -109,6 +110,7 @@ MeshCertificate make_certificate(const StoredMesh& mesh, std::span<const vec3> p
   result.parts = static_cast<std::uint32_t>(closed.boxes.size());
   std::vector<std::uint32_t> first(number.size(), kNone);  // [number] -> a vertex that has it
   for (std::uint32_t v = 0; v < number.size(); ++v) {
+    if (v % 65536 == 0) check_run();
     if (first[number[v]] == kNone) first[number[v]] = v;
     if (first[number[v]] != v) result.coincident.push_back({first[number[v]], v});
   }
@@ -137,13 +139,15 @@ void set_part_boxes(const StoredMesh& mesh, SceneImpl& scene) {
   if (mesh.certificate.parts == 0) return;
   std::fill_n(scene.closed.boxes.begin() + mesh.first_part, mesh.certificate.parts,
               ClosedComponents::Box{vec3(HUGE_VALF), vec3(-HUGE_VALF)});
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (mesh.certificate.of_triangle[t] == kNone) continue;
-    ClosedComponents::Box& box = scene.closed.boxes[mesh.first_part + mesh.certificate.of_triangle[t]];
-    for (const vec3& p : scene.mesh.corners(mesh.first_triangle + t)) {
-      box = {glm::min(box.low, p), glm::max(box.high, p)};
+  checked_ranges(mesh.triangles.size(), 16384, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t != end; ++t) {
+      if (mesh.certificate.of_triangle[t] == kNone) continue;
+      ClosedComponents::Box& box = scene.closed.boxes[mesh.first_part + mesh.certificate.of_triangle[t]];
+      for (const vec3& p : scene.mesh.corners(mesh.first_triangle + static_cast<std::uint32_t>(t))) {
+        box = {glm::min(box.low, p), glm::max(box.high, p)};
+      }
     }
-  }
+  });
 }
 
 /// Closed parts of all meshes, numbered through the scene.
@@ -154,13 +158,14 @@ void number_parts(SceneImpl& scene) {
     mesh.boxed = false;
   }
   scene.closed.boxes.resize(parts);
-  scene.closed.of_triangle.assign(scene.mesh.triangles.size(), kNone);
+  resize_checked(scene.closed.of_triangle, scene.mesh.triangles.size());
   for (const StoredMesh& mesh : scene.meshes) {
-    if (mesh.certificate.parts == 0) continue;
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      const std::uint32_t part = mesh.certificate.of_triangle[t];
-      if (part != kNone) scene.closed.of_triangle[mesh.first_triangle + t] = mesh.first_part + part;
-    }
+    checked_ranges(mesh.triangles.size(), 65536, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t != end; ++t) {
+        const std::uint32_t part = mesh.certificate.parts == 0 ? kNone : mesh.certificate.of_triangle[t];
+        scene.closed.of_triangle[mesh.first_triangle + t] = part == kNone ? kNone : mesh.first_part + part;
+      }
+    });
   }
   scene.parts_are_current = true;
 }

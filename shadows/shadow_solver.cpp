@@ -39,6 +39,8 @@ struct Call {
   std::uint32_t frame;
 };
 
+bool wants_irradiance(const ShadowOutput& out) { return !out.irradiance.empty() || !out.total_irradiance.empty(); }
+
 void check_output(const Call& call, std::size_t receivers, bool has_normals) {
   const ShadowOutput& out = call.output;
   const auto require = [](std::size_t size, std::size_t wanted, const char* what) {
@@ -51,7 +53,7 @@ void check_output(const Call& call, std::size_t receivers, bool has_normals) {
   require(out.visibility.size(), all, "visibility");
   require(out.irradiance.size(), all, "irradiance");
   require(out.total_irradiance.size(), receivers, "total irradiance");
-  const bool integral = !out.irradiance.empty() || !out.total_irradiance.empty();
+  const bool integral = wants_irradiance(out);
   if (integral && !has_normals) usage("output: irradiance needs receivers with normals");
   if ((integral || !out.masks.empty()) && !yields_masks(call.config)) {
     usage(std::string("output: method '") + name_of(call.config.method) + "' yields visibility alone");
@@ -88,6 +90,21 @@ bool is_kept(const Call& call, std::size_t index) {
   return kept.filled && kept.key == key_of(call) && same_geometry(kept.light, call.lights[index]);
 }
 
+/// What the light emits, which may be wrong where its samples are kept. Texels are looked at only where they will be
+/// read: there may be millions.
+void check_emission(const Call& call, std::size_t index) {
+  const Light& light = call.lights[index];
+  const auto require_none = [&](const std::string& fault) {
+    if (fault.empty()) return;
+    throw Error(ErrorCode::kBadInput, "light " + std::to_string(index) + " '" + light.name + "': " + fault);
+  };
+  if (!is_emission(light.emission)) require_none("the emission is negative or not finite");
+  if (light.emission_image.empty()) return;
+  if (light.shape != LightShape::kRectangle) require_none("only rectangles have emission images");
+  require_none(size_fault(light.emission_image));
+  if (wants_irradiance(call.output)) require_none(texel_fault(light.emission_image));
+}
+
 void check_lights(const Call& call) {
   if (call.frame >= kMaxFrames) {
     usage("frame: " + std::to_string(call.frame) + " is not below " + std::to_string(kMaxFrames));
@@ -100,9 +117,7 @@ void check_lights(const Call& call) {
       throw Error(ErrorCode::kBadInput, "light " + std::to_string(i) + " '" + light.name +
                                             "' is outside the scene's reach; ShadowScene::extend widens it");
     }
-    if (light.emission_image.empty() || light.shape == LightShape::kRectangle) continue;
-    throw Error(ErrorCode::kBadInput,
-                "light " + std::to_string(i) + " '" + light.name + "': only rectangles have emission images");
+    check_emission(call, i);
   }
 }
 
@@ -212,7 +227,7 @@ void write_light(const Call& call, std::size_t index, KeptLight& kept) {
   const Workspace::Impl& w = call.workspace;
   const ShadowOutput& out = call.output;
   const std::size_t count = w.receivers.size(), first = index * count;
-  const bool has_masks = yields_masks(call.config), integral = !out.irradiance.empty() || !out.total_irradiance.empty();
+  const bool has_masks = yields_masks(call.config), integral = wants_irradiance(out);
   IrradianceSum sum;
   if (integral) {
     sum = make_irradiance_sum(call.lights[index], kept.samples, call.scene.mesh.frame,

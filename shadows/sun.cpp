@@ -3,6 +3,7 @@
 
 #include "halfshade/error.h"
 #include "halfshade/light.h"
+#include "rasterizer/core/fp_environment.h"
 #include "rasterizer/core/lattice.h"
 #include "rasterizer/core/unit_vector.h"
 
@@ -10,6 +11,7 @@ namespace halfshade {
 
 Light place_sun(const Light& light, const dvec3& low, const dvec3& high) {
   if (light.shape != LightShape::kSun) return light;
+  const FpEnvironment environment;
   const auto require = [&](bool condition, const std::string& what) {
     if (!condition) throw Error(ErrorCode::kBadInput, "light '" + light.name + "': " + what);
   };

@@ -137,8 +137,8 @@ typedef struct halfshade_light {
   double axes[3][3];
   halfshade_points points;
   int two_sided;
-  float emission[3]; /* linear RGB */
-  /* RECTANGLE: replaces emission unless NULL; [height][width][3] linear RGB, row 0 is the edge at +v / 2. */
+  float emission[3]; /* linear RGB >= 0 */
+  /* RECTANGLE: replaces emission unless NULL; [height][width][3] linear RGB >= 0, row 0 is the edge at +v / 2. */
   const float* emission_image;
   uint32_t image_width, image_height;
   double angular_diameter_deg; /* SUN: 0 < angle <= 60 */
@@ -225,6 +225,9 @@ HALFSHADE_API halfshade_status halfshade_scene_commit(halfshade_context* context
 /* Lowest and highest corner of the box that receivers and lights may be in; world space. */
 HALFSHADE_API halfshade_status halfshade_scene_reach(halfshade_context* context, const halfshade_scene* scene,
                                                      double low[3], double high[3]);
+/* Points in the local frame of the last commit, as a G-buffer has them, to world space: [local->count][3] numbers. */
+HALFSHADE_API halfshade_status halfshade_scene_to_world(halfshade_context* context, const halfshade_scene* scene,
+                                                        const halfshade_points* local, double* world);
 /* Set stats->struct_size before. */
 HALFSHADE_API halfshade_status halfshade_scene_get_stats(halfshade_context* context, const halfshade_scene* scene,
                                                          halfshade_scene_stats* stats);
@@ -334,10 +337,11 @@ typedef struct halfshade_gbuffer_view {
   size_t struct_size;
   uint32_t width, height;
   const uint32_t* triangle;      /* visible triangle, or HALFSHADE_NONE for the background */
-  const double* position;        /* [3], local frame of the scene */
+  const double* position;        /* [3], local frame of the scene: see halfshade_scene_to_world */
   const float* geometric_normal; /* [3], unit, on the camera's side */
   const float* albedo;           /* [3], linear RGB */
   const float* depth;            /* along the camera's axis, local frame units */
+  const float* shading_normal;   /* [3], unit, interpolated; = geometric_normal where the scene has none */
 } halfshade_gbuffer_view;
 
 HALFSHADE_API halfshade_status halfshade_gbuffer_create(halfshade_context* context, halfshade_gbuffer** gbuffer);

@@ -119,7 +119,9 @@ class HALFSHADE_API ShadowSolver {
 
   /// Throws Error{kUsage}: scene not committed, workspace in use, wrong length of a span, masks or irradiance from a
   /// method that yields no masks, irradiance without normals; Error{kBadInput}: a receiver or light that is not finite,
-  /// outside scene.reach(), or degenerate, an own triangle that is not there, all named by number;
+  /// outside scene.reach(), or degenerate, emission that is negative or not finite, an emission image of another
+  /// size than it says, an own triangle that is not there, all named by number (texels of an image are looked at where
+  /// irradiance is asked for);
   /// Error{kCancelled}; std::bad_alloc; what `execution` throws. Nothing is written where an argument is wrong.
   void solve(const ShadowScene& scene, const ReceiverView& receivers, std::span<const Light> lights,
              Workspace& workspace, const ShadowOutput& output, const Execution& execution = {}) const;

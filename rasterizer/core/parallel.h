@@ -13,6 +13,7 @@
 
 #include "rasterizer/core/fp_environment.h"
 #include "rasterizer/core/function_ref.h"
+#include "rasterizer/core/reuse.h"
 #include "rasterizer/core/run.h"
 
 namespace halfshade {
@@ -38,7 +39,7 @@ void parallel_sort(std::vector<T>& values, std::vector<T>& scratch, const Before
   parallel_tasks((count + kRun - 1) / kRun, [&](std::size_t r) {
     std::sort(at(values, r * kRun), at(values, std::min(count, (r + 1) * kRun)), before);
   });
-  if (count > kRun) scratch.resize(count);
+  if (count > kRun) resize_checked(scratch, count);
   for (std::size_t width = kRun; width < count; width *= 2) {
     // Each task writes one part of the merged runs; binary search finds where its ends lie in the two halves.
     parallel_tasks((count + kRun - 1) / kRun, [&](std::size_t part) {

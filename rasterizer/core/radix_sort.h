@@ -30,7 +30,7 @@ void parallel_radix_sort(std::vector<Item>& items, std::vector<Item>& scratch, s
   const std::size_t parts = (items.size() + kPart - 1) / kPart;
   std::vector<std::uint32_t>& counts = kept.counts;  // not a structured binding: Clang before 16 cannot capture one
   std::vector<std::uint32_t>& offsets = kept.offsets;
-  scratch.resize(items.size());
+  resize_checked(scratch, items.size());
   for (int shift = 0; shift < 32 && ((key_end - (key_end != 0)) >> shift) != 0; shift += kDigitBits) {
     const auto digit = [&](const Item& item) { return std::size_t{key(item) >> shift} & (kDigits - 1); };
     const auto for_part = [&](std::size_t part, const auto& body) {

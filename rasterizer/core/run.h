@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <exception>
 
 #include "halfshade/error.h"
@@ -68,6 +69,15 @@ class RunScope {
 inline void check_run() {
   Run* run = current_run();
   if (run != nullptr && run->watched()) run->check();
+}
+
+/// body(begin, end) over pieces of [0, count) of at most `piece` items, in order, with a check before each.
+template <class Body>
+void checked_ranges(std::size_t count, std::size_t piece, const Body& body) {
+  for (std::size_t begin = 0; begin < count; begin += piece) {
+    check_run();
+    body(begin, begin + piece < count ? begin + piece : count);
+  }
 }
 
 }  // namespace halfshade

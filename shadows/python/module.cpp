@@ -85,7 +85,8 @@ std::vector<dvec3> points_of(const py::object& values) {
 
 void bind_lights(py::module_& m) {
   const py::tuple white = py::make_tuple(1.0, 1.0, 1.0);
-  py::class_<Light>(m, "Light")
+  py::class_<Light>(m, "Light",
+                    "World space; u and v are full edge vectors; flat lights face u x v or `normal`, unless two_sided.")
       .def_static(
           "point",
           [](const py::object& center, const py::object& emission) {
@@ -209,6 +210,27 @@ PyGBuffer rasterized(PyScene& scene, std::uint32_t width, std::uint32_t height, 
   return gbuffer;
 }
 
+/// Any number of points, [..., 3].
+py::array_t<double> to_world(PyScene& scene, const py::object& values) {
+  const auto points = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(values);
+  if (!points) {
+    PyErr_Clear();
+    throw Error(ErrorCode::kUsage, "points: not an array of numbers");
+  }
+  if (points.ndim() == 0 || points.shape(points.ndim() - 1) != 3) {
+    throw Error(ErrorCode::kUsage, "points: the last dimension is not 3");
+  }
+  py::array_t<double> world(std::vector<py::ssize_t>(points.shape(), points.shape() + points.ndim()));
+  const double* from = points.data();
+  double* to = world.mutable_data();
+  const UseCount::Reading reading(scene.uses);
+  for (py::ssize_t i = 0; i < points.size(); i += 3) {
+    const dvec3 p = scene.value.to_world({from[i], from[i + 1], from[i + 2]});
+    to[i] = p.x, to[i + 1] = p.y, to[i + 2] = p.z;
+  }
+  return world;
+}
+
 py::array_t<double> reach_of(const PyScene& scene) {
   const std::array<dvec3, 2> box = scene.value.reach();
   return py::array_t<double>(std::vector<py::ssize_t>{2, 3}, &box[0].x);
@@ -217,7 +239,9 @@ py::array_t<double> reach_of(const PyScene& scene) {
 void bind_scenes(py::module_& m) {
   using Writing = UseCount::Writing;
   using Reading = UseCount::Reading;
-  py::class_<PyScene>(m, "Scene")
+  py::class_<PyScene>(
+      m, "Scene",
+      "Meshes in world space. Changes are done together by commit(). A change while another thread solves raises.")
       .def(py::init([](double rebuild_cost, bool back_face_casters) {
              return std::make_unique<PyScene>(SceneConfig{rebuild_cost, back_face_casters});
            }),
@@ -283,6 +307,8 @@ void bind_scenes(py::module_& m) {
       .def("rasterize", &rasterized, "width"_a, "height"_a, py::kw_only(), "eye"_a,
            "target"_a = py::make_tuple(0.0, 0.0, 0.0), "up"_a = py::make_tuple(0.0, 1.0, 0.0), "fov_y_deg"_a = 45.0,
            "progress"_a = py::none(), "serial"_a = false)
+      .def("to_world", &to_world, "points"_a,
+           "Points in the local frame of the last commit, [..., 3], as GBuffer.position has them, to world space.")
       .def(
           "triangle_of",
           [](PyScene& scene, std::uint32_t number) {
@@ -321,7 +347,8 @@ auto image(std::vector<Entry> GBuffer::*member) {
 }
 
 void bind_gbuffers(py::module_& m) {
-  py::class_<PyGBuffer>(m, "GBuffer")
+  py::class_<PyGBuffer>(
+      m, "GBuffer", "What a camera sees, [height, width], row 0 = top. The arrays are read-only views of its memory.")
       .def_property_readonly("width", [](const PyGBuffer& g) { return g.value.width; })
       .def_property_readonly("height", [](const PyGBuffer& g) { return g.value.height; })
       .def_property_readonly("triangle", image<std::uint32_t>(&GBuffer::triangle))
@@ -455,7 +482,8 @@ py::dict solve(const ShadowSolver& solver, PyScene& scene, const py::object& rec
 
 void bind_solvers(py::module_& m) {
   const ShadowConfig defaults;
-  py::class_<PyWorkspace>(m, "Workspace")
+  py::class_<PyWorkspace>(m, "Workspace",
+                          "Scratch memory, and what can be kept from call to call, of one call at a time.")
       .def(py::init<std::uint32_t>(), "kept_lights"_a = WorkspaceConfig().kept_lights)
       .def("clear",
            [](PyWorkspace& workspace) {

@@ -271,7 +271,33 @@ static void pictures(void) {
   f.output.mask_count = 0;
   CHECK_OK(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output));
   CHECK(picture[12 * 32 + 2] < 0.1f && picture[12 * 32 + 29] > 0.9f); /* shadow on the left */
-  f.output.visibility_count = 0;                                      /* of an array that is wanted */
+  CHECK(fabsf(view.shading_normal[3 * (12 * 32 + 16) + 1] - 1.0f) < 1e-6f);
+  /* Entries of a row, put to world space, are receivers with the same result. */
+  double world[32 * 3];
+  uint32_t meshes[32], triangles[32];
+  float row[32];
+  const halfshade_points local = doubles(view.position + 3 * 12 * 32, 32);
+  CHECK_OK(halfshade_scene_to_world(f.context, f.scene, &local, world));
+  for (int i = 0; i < 32; ++i) {
+    CHECK(fabs(world[3 * i + 1]) < 1e-6);
+    CHECK_OK(halfshade_scene_triangle_of(f.context, f.scene, view.triangle[12 * 32 + i], &meshes[i], &triangles[i]));
+  }
+  CHECK(world[0] < -1.0 && world[3 * 31] > 1.0 && world[2] < eye[2]);
+  halfshade_receivers of_row = HALFSHADE_RECEIVERS_INIT;
+  of_row.positions = doubles(world, 32);
+  of_row.normals = floats(view.geometric_normal + 3 * 12 * 32, 32);
+  of_row.meshes.data = meshes;
+  of_row.triangles.data = triangles;
+  of_row.meshes.count = of_row.triangles.count = 32;
+  of_row.first = 12 * 32;
+  f.output.visibility = row;
+  f.output.visibility_count = 32;
+  CHECK_OK(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &of_row, &f.light, 1, &f.output));
+  for (int i = 0; i < 32; ++i) CHECK(row[i] == picture[12 * 32 + i]);
+  CHECK_FAILS(halfshade_scene_to_world(f.context, f.scene, &local, NULL), HALFSHADE_ERROR_USAGE, "world");
+  CHECK_FAILS(halfshade_scene_to_world(f.context, f.scene, NULL, world), HALFSHADE_ERROR_USAGE, "local");
+  f.output.visibility = picture;
+  f.output.visibility_count = 0; /* of an array that is wanted */
   CHECK_FAILS(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output),
               HALFSHADE_ERROR_USAGE, "visibility");
   f.output.visibility_count = 5;

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numeric>
 #include <set>
+#include <thread>
 
 #include "rasterizer/core/hash.h"
 #include "rasterizer/core/parallel.h"
@@ -20,13 +21,20 @@ using namespace halfshade::test;
 
 namespace {
 
-/// Threads that enter TBB's arenas while it lives.
+/// Threads that enter one of TBB's arenas while it lives: the calling thread's, or the one given.
 class ArenaWatch : public tbb::task_scheduler_observer {
  public:
   ArenaWatch() { observe(true); }
+  explicit ArenaWatch(tbb::task_arena& arena) : tbb::task_scheduler_observer(arena) { observe(true); }
   ~ArenaWatch() override { observe(false); }
-  void on_scheduler_entry(bool worker) override { workers += worker; }
-  std::atomic<int> workers{0};
+  void on_scheduler_entry(bool worker) override {
+    workers += worker;
+    const int now = ++inside;
+    for (int before = most; before < now && !most.compare_exchange_weak(before, now);) {
+    }
+  }
+  void on_scheduler_exit(bool) override { --inside; }
+  std::atomic<int> workers{0}, inside{0}, most{0};  // workers that came; threads now, and at most at once
 };
 
 Execution executor(Executor which) {
@@ -173,4 +181,29 @@ TEST_CASE("the callback is called on the calling thread alone, with growing shar
     CHECK(shares.back() <= 1.0);
     CHECK(shares.back() > 0.6);
   }
+}
+
+TEST_CASE("work stays in the caller's arena, with no more threads than it has") {
+  const tbb::global_control more(tbb::global_control::max_allowed_parallelism, 8);
+  const Ground ground(48);
+  const Light light = frame_light();
+  const std::vector<OwnedMesh> meshes = embed_meshes(24);
+  std::thread host([&] {  // with an arena around it that nobody has worked in yet
+    const ArenaWatch around;
+    tbb::task_arena arena(2);
+    const ArenaWatch watch(arena);
+    arena.execute([&] {
+      const ShadowSolver solver({.light_sample_count = 64});
+      for (int round = 0; round < 100 && (round < 3 || watch.workers == 0); ++round) {
+        EmbedScene s(meshes);
+        static_cast<void>(solve(solver, s.scene, ground.view(), light));
+        GBuffer gbuffer;
+        rasterize(s.scene, {.eye = {0, 3, 6}, .target = {0, 0.5, 0}}, {}, gbuffer);
+      }
+    });
+    CHECK(watch.workers > 0);  // or there was nothing to see
+    CHECK(watch.most == 2);
+    CHECK(around.workers == 0);
+  });
+  host.join();
 }

@@ -37,15 +37,23 @@ struct Input {
   std::vector<OwnedMesh> meshes = embed_meshes(10);
   Transform transform = turned(0.37, {0.31, 1.1, 0.17});
   Ground ground{24};
-  Light light = frame_light();
+  Light light = frame_light(), sun;
   Scene scene = scene_of(box({-0.5, 1, -0.5}, {0.5, 2, 0.5}));
   Camera camera{.eye = {0, 3, 6}, .target = {0, 0.5, 0}};
+  std::vector<dvec3> aside = {dvec3(5.3, 7.1, 6.4), dvec3(7.9, 7.7, 6.6)};
+
+  Input() {
+    light.emission_image = {"thirds", 3, 1, {vec3(0.1f, 0.3f, 0.7f), vec3(1.0f / 3.0f), vec3(0.9f, 0.0f, 1e-39f)}};
+    sun.shape = LightShape::kSun, sun.normal = {0.3, -0.7, 0.1};
+  }
 };
 
 /// Everything an embedding program calls, from the very first mesh on.
 struct Everything {
   Solved solved;
   std::vector<std::uint32_t> triangles;
+  std::vector<dvec3> places;  // the sun's, and two in a scene
+  std::vector<vec3> colors;
   std::string hash;
 
   Everything(const Input& input, const Execution& execution) {
@@ -60,13 +68,24 @@ struct Everything {
     raster.width = raster.height = 50;
     rasterize(s.scene, input.camera, raster, gbuffer, execution);
     triangles = gbuffer.triangle;
+    const Light sun = place_sun(input.sun, {-3, 0, -3}, {3, 2.1, 3});
+    ShadowScene aside;
+    aside.extend(PointView(input.aside));
+    aside.commit(execution);
+    places = {sun.center, sun.normal, dvec3(sun.radius), aside.to_world({0.1, 0.3, 0.7}),
+              aside.to_world({-0.1, 0.2, 0.9})};
+    const std::vector<vec3> weights = sample_emission(input.light, solver.config());
+    colors = weights;
+    for (const std::uint64_t& mask : solved.masks) {
+      colors.push_back(weighted_visibility({&mask, 1}, std::span(weights).first(64)));
+    }
     VisibilityMasks masks;
     solve_shadows(input.scene, receivers_at(input.ground.positions), input.light, {.light_sample_count = 64}, masks);
     hash = masks.hash();
   }
   bool operator==(const Everything& o) const {
     return solved.masks == o.solved.masks && solved.irradiance == o.solved.irradiance && triangles == o.triangles &&
-           hash == o.hash;
+           places == o.places && colors == o.colors && hash == o.hash;
   }
 };
 

@@ -2,8 +2,11 @@
 #include <doctest/doctest.h>
 
 #include <ctime>
+#include <memory>
 #include <thread>
 
+#include "halfshade/c_api.h"
+#include "rasterizer/scenes/scene_stream.h"
 #include "support/counted_new.h"
 #include "support/embed_scene.h"
 #include "support/host_loop.h"
@@ -115,11 +118,118 @@ void stop_at_random(std::uint32_t rings, std::uint32_t side, int stops) {
   CHECK(worst <= 100.0);
 }
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+#else
+constexpr bool kSanitized = false;
+#endif
+
+/// Runs `call` on this thread; the host must be asked every 100 ms of processor time, from the start to the end: for so
+/// long nobody can stop the call.
+template <class Call>
+void check_silence(const std::string& what, const Call& call) {
+  double last = cpu_ms(), longest = 0.0;
+  const auto heard = [&] {
+    const double now = cpu_ms();
+    longest = std::max(longest, now - last);
+    last = now;
+    return true;
+  };
+  Execution execution{Executor::kSerial};
+  execution.progress = [&](double) { return heard(); };
+  call(execution);
+  heard();
+  MESSAGE(what, ": longest silence ", longest, " ms");
+  CHECK((longest <= 100.0 || kSanitized));
+}
+
+/// From an empty scene to a picture, of `rings`^2 * 4 triangles.
+void check_silences(std::uint32_t rings) {
+  const Ground ground(64);
+  const Light light = frame_light();
+  const ShadowSolver solver({.light_sample_count = 64});
+  ShadowScene scene;
+  scene.extend(light);
+  scene.extend(PointView(ground.positions));
+  const std::uint32_t mesh = scene.add_mesh(ball({0.0, 1.2, 0.0}, 0.9, rings).view());
+  Workspace workspace;
+  const auto solve_all = [&](const Execution& e) { solve(solver, scene, ground.view(), {&light, 1}, workspace, e); };
+  check_silence("first commit", [&](const Execution& e) { scene.commit(e); });
+  check_silence("first solve", solve_all);
+  check_silence("second solve", solve_all);
+  scene.set_transform(mesh, turned(0.3, {0.1, 0.0, 0.0}));
+  check_silence("second commit", [&](const Execution& e) { scene.commit(e); });
+  check_silence("solve after it", solve_all);
+  GBuffer gbuffer;
+  RasterConfig config;
+  config.width = config.height = 256;
+  const Camera camera{.eye = {0, 3, 6}, .target = {0, 0.5, 0}};
+  check_silence("rasterize", [&](const Execution& e) { rasterize(scene, camera, config, gbuffer, e); });
+}
+
 }  // namespace
 
 TEST_CASE("S43: stopped at random ticks, by false or by an exception") { stop_at_random(40, 48, 100); }
 
 TEST_CASE("S43_long: the same in a scene of a million triangles") { stop_at_random(500, 128, 12); }
+
+TEST_CASE("S43: the host is asked every 100 ms in a scene of 250,000 triangles") { check_silences(250); }
+
+TEST_CASE("S43_long: the host is asked every 100 ms in a scene of a million triangles") { check_silences(500); }
+
+TEST_CASE("S43: a picture that was stopped leaves its G-buffer usable") {
+  const EmbedScene s(24);
+  const Camera camera{.eye = {0, 3, 6}, .target = {0, 0.5, 0}};
+  RasterConfig config;
+  config.width = config.height = 1024;
+  GBuffer expected, gbuffer;
+  rasterize(s.scene, camera, config, expected);
+  const auto draw = [&](const Execution& e) { rasterize(s.scene, camera, config, gbuffer, e); };
+  int stopped = 0;
+  for (const Executor executor : {Executor::kSerial, Executor::kArena, Executor::kHost}) {
+    for (const int tick : {0, 1, 3}) {
+      double latency = 0.0;
+      const int how = stop_at(tick, tick == 1, executor, draw, latency);
+      CHECK(how < 2);
+      stopped += how;
+      CHECK(latency <= 100.0);
+      draw({executor == Executor::kHost ? Executor::kSerial : executor});
+      CHECK(gbuffer.triangle == expected.triangle);
+    }
+  }
+  CHECK(stopped >= 3);
+}
+
+TEST_CASE("S43: a streamed solve that was stopped can be asked again") {
+  const Ground ground(32);
+  Random random(8);
+  const auto scene = std::make_shared<const Scene>(scene_of(random_triangles(random, 20000, 0.1, 0.5, 2.0)));
+  SceneStream stream = stream_of_scene(scene, 1000);
+  ShadowConfig config{.light_sample_count = 64};
+  VisibilityMasks expected, masks;
+  const auto solve_stream = [&](VisibilityMasks& to) {
+    solve_shadows(stream, receivers_at(ground.positions), frame_light(), config, StreamOptions{}, to);
+  };
+  int ticks = 0;
+  config.progress = [&](double) { return ++ticks > 0; };
+  solve_stream(expected);
+  REQUIRE(ticks > 1);
+  for (int tick = 0; tick < ticks; tick += std::max(1, ticks / 10)) {
+    CAPTURE(tick);
+    int at = 0;
+    config.progress = [&](double) { return at++ < tick; };
+    CHECK_THROWS_AS(solve_stream(masks), Error);
+    config.progress = nullptr;
+    solve_stream(masks);
+    CHECK(masks.words == expected.words);
+  }
+}
 
 TEST_CASE("S43: memory runs out at each of the first 500 allocations") {
   const Ground ground(24);
@@ -194,4 +304,67 @@ TEST_CASE("S43: memory runs out at each of the first 500 allocations") {
     // TBB's threads keep a few bytes of their own, once each; what we lose we would lose at every failure.
     CHECK(kept <= (executor == Executor::kSerial ? 0 : 2 * static_cast<int>(std::thread::hardware_concurrency())));
   }
+}
+
+TEST_CASE("S43: memory that runs out in a C call is a status of it, and the call can be made again") {
+  halfshade_context_desc serial = {};
+  serial.struct_size = sizeof serial;
+  serial.executor = HALFSHADE_EXECUTOR_SERIAL;
+  halfshade_context* context = nullptr;
+  halfshade_scene* scene = nullptr;
+  halfshade_solver* solver = nullptr;
+  REQUIRE(halfshade_context_create(&serial, &context) == HALFSHADE_OK);
+  REQUIRE(halfshade_scene_create(context, nullptr, &scene) == HALFSHADE_OK);
+  REQUIRE(halfshade_solver_create(context, nullptr, &solver) == HALFSHADE_OK);
+  const OwnedMesh round = ball({0.0, 1.2, 0.0}, 0.9, 6);
+  const Ground ground(16);
+  halfshade_mesh_desc mesh = {};
+  mesh.struct_size = sizeof mesh;
+  mesh.positions = {round.positions.data(), round.positions.size(), 0, HALFSHADE_FLOAT64};
+  mesh.triangles = {round.triangles[0].data(), round.triangles.size(), 0};
+  mesh.alpha_map = HALFSHADE_NONE;
+  for (int k = 0; k < 3; ++k) mesh.transform[k][k] = 1.0;
+  REQUIRE(halfshade_scene_add_mesh(context, scene, &mesh, nullptr) == HALFSHADE_OK);
+  halfshade_light light = {};
+  light.struct_size = sizeof light;
+  light.shape = HALFSHADE_LIGHT_RECTANGLE;
+  light.center[1] = 3.0;
+  light.u[0] = light.v[2] = 1.0;
+  REQUIRE(halfshade_scene_extend_light(context, scene, &light) == HALFSHADE_OK);
+  halfshade_receivers receivers = {};
+  receivers.struct_size = sizeof receivers;
+  receivers.positions = {ground.positions.data(), ground.positions.size(), 0, HALFSHADE_FLOAT64};
+  receivers.frame = HALFSHADE_NONE;
+  REQUIRE(halfshade_scene_extend_points(context, scene, &receivers.positions) == HALFSHADE_OK);
+  REQUIRE(halfshade_scene_commit(context, scene) == HALFSHADE_OK);
+  std::vector<float> visibility(ground.positions.size()), expected;
+  halfshade_output output = {};
+  output.struct_size = sizeof output;
+  output.visibility = visibility.data();
+  output.visibility_count = visibility.size();
+  int failures = 0;
+  for (std::uint64_t n = 0; n <= 200; ++n) {  // 0: none fails
+    CAPTURE(n);
+    halfshade_workspace* workspace = nullptr;
+    REQUIRE(halfshade_workspace_create(context, nullptr, &workspace) == HALFSHADE_OK);
+    const auto solve_all = [&] {
+      return halfshade_solve(context, solver, scene, workspace, &receivers, &light, 1, &output);
+    };
+    fail_allocation(n);
+    const halfshade_status status = solve_all();
+    const bool failed = n != 0 && allocation_failed();
+    fail_allocation(0);
+    failures += failed;
+    CHECK(status == (failed ? HALFSHADE_ERROR_OUT_OF_MEMORY : HALFSHADE_OK));
+    if (failed) CHECK(std::string(halfshade_last_error(context)) != "");
+    CHECK(solve_all() == HALFSHADE_OK);
+    if (n == 0) expected = visibility;
+    CHECK(visibility == expected);
+    halfshade_workspace_destroy(&workspace);
+  }
+  CHECK(failures > 20);
+  CHECK(std::count(expected.begin(), expected.end(), 1.0f) < std::ssize(expected));
+  halfshade_solver_destroy(&solver);
+  halfshade_scene_destroy(&scene);
+  halfshade_context_destroy(&context);
 }

@@ -314,6 +314,30 @@ TEST_CASE("wrong calls are refused by name and write nothing") {
   lights[0].center.y = HUGE_VAL;
   CHECK(call(ground.view(), out) == "light 'light': a coordinate is not finite");
   lights[0] = frame_light();
+  const float inf = std::numeric_limits<float>::infinity();
+  for (const bool kept : {false, true}) {  // the samples of the light, which do not depend on what it emits
+    CAPTURE(kept);
+    const ShadowOutput lit{.visibility = visibility, .irradiance = irradiance};
+    for (const vec3& wrong : {vec3(std::nanf(""), 1, 1), vec3(1, -1, 1), vec3(1, 1, inf)}) {
+      lights[0].emission = wrong;
+      CHECK(call(ground.view(), out) == "light 0 'light': the emission is negative or not finite");
+      lights[0].emission = vec3(1.0f);
+      lights[0].emission_image = {"image", 2, 1, {vec3(1.0f), wrong}};
+      CHECK(call(ground.view(), lit) == "light 0 'light': texel 1 of the image is negative or not finite");
+      lights[0].emission_image = {};
+    }
+    for (const auto& [width, height] : {std::pair{4000u, 4000u}, {0u, 1u}, {1u, 0u}, {~0u, ~0u}}) {
+      lights[0].emission_image = {"image", width, height, {vec3(1.0f)}};
+      const std::string what = "the image has 1 texels for " + std::to_string(width) + " x " + std::to_string(height);
+      CHECK(call(ground.view(), out) == "light 0 'light': " + what);
+      CHECK(call(ground.view(), lit) == "light 0 'light': " + what);
+    }
+    lights[0] = frame_light();
+    CHECK(irradiance == std::vector<vec3>(16, vec3(0.0f)));
+    CHECK(visibility == std::vector<float>(16, -1.0f));
+    CHECK(call(ground.view(), {}) == "nothing was thrown");
+  }
+  CHECK(workspace.stats().lights_kept == 1);
   s.scene.set_transform(s.ids[1], moved_by({0, 1, 0}));
   CHECK(call(ground.view(), out) == "the scene has changes that are not committed");
   CHECK(visibility == std::vector<float>(16, -1.0f));

@@ -1,8 +1,9 @@
 // Small scenes, lights and receivers made of the input's bytes, degenerate and broken ones among them. What the oracle
-// answers, an exact method must answer bit by bit; what it refuses, the method must refuse.
+// answers, an exact method must answer bit by bit; what it refuses, the method must refuse. Last, an emission image.
 #include <cmath>
 
 #include "fuzz/coordinates.h"
+#include "halfshade/emission.h"
 #include "halfshade/shadows.h"
 
 namespace halfshade::fuzz {
@@ -88,9 +89,38 @@ class SceneReader {
     return result;
   }
 
+  /// Sometimes with texels too many or too few, or with one that nothing can emit.
+  EmissionImage image() {
+    EmissionImage image{"", in_.below(5), in_.below(5), {}};
+    image.rgb.resize(image.width * image.height, vec3(1.0f));
+    if (in_.broken()) image.rgb.resize(in_.below(30));
+    if (in_.broken()) image.width = in_.take<std::uint32_t>();
+    for (std::uint32_t n = in_.below(4); n > 0 && !image.empty(); --n) {
+      vec3& texel = image.rgb[in_.below(static_cast<std::uint32_t>(image.rgb.size()))];
+      texel = vec3(in_.flag() ? in_.take<float>() : static_cast<float>(in_.byte()));
+    }
+    return image;
+  }
+
  private:
   CoordinateReader in_;
 };
+
+/// Is the image refused exactly where EmissionImage says that it cannot be, and is what is read of it light?
+void check_emission(const EmissionImage& image, const ShadowConfig& config) {
+  bool good = !image.empty() && image.rgb.size() == std::uint64_t{image.width} * image.height;
+  for (const vec3& texel : image.rgb) {
+    for (int k = 0; k < 3; ++k) good &= std::isfinite(texel[k]) && texel[k] >= 0.0f;
+  }
+  Light light;
+  light.emission_image = image;
+  std::vector<vec3> weights;
+  const Refusal refusal = refusal_of([&] { weights = sample_emission(light, config); });
+  require(refusal.refused == !good, "emission images are refused where they are wrong: " + refusal.message);
+  for (const vec3& weight : weights) {
+    for (int k = 0; k < 3; ++k) require(std::isfinite(weight[k]) && weight[k] >= 0.0f, "weights are light");
+  }
+}
 
 }  // namespace
 
@@ -108,6 +138,7 @@ void fuzz_solve(Bytes input) {
   const std::string name = std::string("method ") + traits_of(method).name;
   require(refusal.refused == of_oracle.refused, name + " refuses what the oracle refuses: " + refusal.message);
   if (!refusal.refused) require(masks.words == truth.words, name + " has the oracle's bits");
+  check_emission(in.image(), config);
 }
 
 }  // namespace halfshade::fuzz

@@ -80,6 +80,24 @@ TEST_CASE("emission of a light is that of its samples, set by set; only rectangl
   CHECK_THROWS_AS(sample_emission(light, config), Error);
 }
 
+TEST_CASE("images with too few texels or wrong ones are refused, and samples outside of them") {
+  Light light = frame_light();
+  const std::vector<dvec2> st = {dvec2(0.5)};
+  const auto refused = [&](const EmissionImage& image, const char* what) {
+    light.emission_image = image;
+    CHECK_THROWS_WITH_AS(sample_emission(image, st), what, Error);
+    CHECK_THROWS_WITH_AS(sample_emission(light, frame_config(16)), what, Error);
+  };
+  refused({"", 4000, 4000, {vec3(1.0f)}}, "emission: the image has 1 texels for 4000 x 4000");
+  refused({"", 0, 0, {vec3(1.0f)}}, "emission: the image has 1 texels for 0 x 0");
+  refused({"", 1, 2, {vec3(1.0f), vec3(0, -1, 0)}}, "emission: texel 1 of the image is negative or not finite");
+  refused({"", 1, 1, {vec3(std::nanf(""))}}, "emission: texel 0 of the image is negative or not finite");
+  const EmissionImage image = random_image(3, 3, 4);
+  for (const dvec2& p : {dvec2(-3.0, 0.5), dvec2(0.5, 1.1), dvec2(std::nan(""), 0.5)}) {
+    CHECK_THROWS_WITH_AS(sample_emission(image, std::span(&p, 1)), "emission: sample 0 is not within 0..1", Error);
+  }
+}
+
 TEST_CASE("stored masks relit with the original image give the original render, and an image changes no mask bit") {
   const BuiltinScene scene = make_builtin_scene("columns", 0);
   View view = scene.view;

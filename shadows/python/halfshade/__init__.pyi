@@ -75,7 +75,8 @@ class GBuffer:
     @property
     def triangle(self) -> npt.NDArray[np.uint32]: ...
     @property
-    def position(self) -> npt.NDArray[np.float64]: ...
+    def position(self) -> npt.NDArray[np.float64]:
+        """In the scene's local frame: see Scene.to_world."""
     @property
     def geometric_normal(self) -> _Floats: ...
     @property
@@ -122,6 +123,8 @@ class Scene:
         progress: _Progress = ...,
         serial: bool = ...,
     ) -> GBuffer: ...
+    def to_world(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Points in the local frame of the last commit, [..., 3], as GBuffer.position has them, to world space."""
     def triangle_of(self, number: int) -> tuple[int, int]:
         """(mesh, triangle) of a number in a G-buffer."""
     @property
@@ -149,6 +152,8 @@ class Result(NamedTuple):
     total_irradiance: Optional[_Floats]
 
 class Solver:
+    """A configuration: method, light samples, seed. Immutable; threads may share it."""
+
     def __init__(
         self,
         *,
