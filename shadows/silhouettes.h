@@ -24,8 +24,8 @@
 // - hidden from behind: all samples are;
 // - hidden neither way: none is, by C;
 // - only from the front: all are, but perhaps by the receiver's own triangle alone, which does not count. Undecided, as
-//   is all that C hides from receivers whose own triangle is one of C's and shows its back: another triangle may hide l0,
-//   and the own one alone what lies elsewhere. A watertight mesh seen from outside has none.
+//   are receivers whose own triangle is one of C's and shows its back: another triangle may hide l0, and the own one
+//   alone what lies elsewhere. A watertight mesh seen from outside has none.
 #pragma once
 
 #include "shadows/closed_components.h"
