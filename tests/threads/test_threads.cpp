@@ -141,7 +141,15 @@ TEST_CASE("threads: progress is reported on the calling thread; a solve that is 
     const int all = reports;
     for (const int stop : {0, all / 2}) {
       reports = 0, allowed = stop;
-      CHECK_THROWS_AS(solve_shadows(w.scene, w.receivers, test::frame_light(), config, masks), Error);
+      bool stopped = false;
+      try {
+        solve_shadows(w.scene, w.receivers, test::frame_light(), config, masks);
+      } catch (const Error& error) {
+        stopped = error.code() == ErrorCode::kCancelled;
+      }
+      // Most questions come by the clock, so this run may ask fewer than the one before.
+      CHECK(stopped == (reports > stop));
+      if (stop == 0) CHECK(stopped);
     }
     reports = 0, allowed = 1 << 30;
     solve_shadows(w.scene, w.receivers, test::frame_light(), config, masks);
