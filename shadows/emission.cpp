@@ -49,7 +49,8 @@ void add_weights(const EmissionImage& image, std::span<const dvec2> st, std::vec
 
 void check_image(const EmissionImage& image) {
   if (image.empty()) throw Error(ErrorCode::kUsage, "emission: the image is empty");
-  const std::string fault = !size_fault(image).empty() ? size_fault(image) : texel_fault(image);
+  std::string fault = size_fault(image);
+  if (fault.empty()) fault = texel_fault(image);
   if (!fault.empty()) throw Error(ErrorCode::kBadInput, "emission: " + fault);
 }
 

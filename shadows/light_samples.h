@@ -1,7 +1,6 @@
 // Where the samples of an area light lie: a pure function of (light, pattern, count, sets, seed, frame).
 #pragma once
 
-#include <limits>
 #include <string>
 
 #include "halfshade/shadows.h"
@@ -54,10 +53,7 @@ void check_light(const Light& light, const ShadowConfig& config);
 std::uint32_t samples_of(const Light& light, const ShadowConfig& config);
 
 /// May a light emit this? Finite, and no colour below 0.
-inline bool is_emission(const vec3& c) {
-  constexpr float kMost = std::numeric_limits<float>::max();
-  return c.x >= 0.0f && c.x <= kMost && c.y >= 0.0f && c.y <= kMost && c.z >= 0.0f && c.z <= kMost;
-}
+inline bool is_emission(const vec3& c) { return is_finite(dvec3(c)) && c.x >= 0.0f && c.y >= 0.0f && c.z >= 0.0f; }
 
 /// What is wrong with the image, for a message, or "": without as many texels as its width and height say, at least
 /// one.

@@ -10,6 +10,7 @@
 #include "support/counted_new.h"
 #include "support/embed_scene.h"
 #include "support/host_loop.h"
+#include "support/sanitized.h"
 
 using namespace halfshade;
 using namespace halfshade::test;
@@ -117,18 +118,6 @@ void stop_at_random(std::uint32_t rings, std::uint32_t side, int stops) {
   CHECK(stopped_solves > stops / 4);
   CHECK(worst <= 100.0);
 }
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
-#else
-constexpr bool kSanitized = false;
-#endif
 
 /// Runs `call` on this thread; the host must be asked every 100 ms of processor time, from the start to the end: for so
 /// long nobody can stop the call.

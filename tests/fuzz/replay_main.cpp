@@ -13,6 +13,7 @@
 #include <tbb/global_control.h>
 
 #include "fuzz/fuzz_target.h"
+#include "support/sanitized.h"
 
 namespace {
 
@@ -26,13 +27,8 @@ struct Target {
 constexpr Target kTargets[] = {{"obj", fuzz_obj}, {"mtl", fuzz_mtl},     {"view", fuzz_view},  {"image", fuzz_image},
                                {"npy", fuzz_npy}, {"solve", fuzz_solve}, {"c_api", fuzz_c_api}};
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kMostSeconds = 10.0;  // of slower code
-constexpr long kMostKilobytes = 4l << 20;
-#else
-constexpr double kMostSeconds = 1.0;
-constexpr long kMostKilobytes = 512l << 10;
-#endif
+constexpr double kMostSeconds = halfshade::test::kSanitized ? 10.0 : 1.0;
+constexpr long kMostKilobytes = halfshade::test::kSanitized ? 4l << 20 : 512l << 10;
 
 std::vector<fs::path> files_of(const fs::path& path) {
   if (!fs::is_directory(path)) return {path};

@@ -12,6 +12,7 @@
 #include <doctest/doctest.h>
 
 #include "halfshade/error.h"
+#include "support/sanitized.h"
 
 namespace halfshade::test {
 
@@ -82,13 +83,7 @@ class PeakMemory {
     start_ = peak();
   }
   /// MiB; 0 where the system does not tell, or a sanitizer's own memory would count.
-  double growth() const {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    return 0.0;
-#else
-    return peak() - start_;
-#endif
-  }
+  double growth() const { return kSanitized ? 0.0 : peak() - start_; }
 
  private:
   static double peak() {

@@ -35,13 +35,11 @@ void add_sheet(Random& random, double height, bool unruly, std::vector<Triangle>
       p[i][j] = {x, height + y + random.uniform(-noise, noise), z};
     }
   }
-  for (int i = 0; i < side; ++i) {
-    for (int j = 0; j < side; ++j) {
-      triangles.push_back({p[i][j], p[i][j + 1], p[i + 1][j]});
-      triangles.push_back({p[i + 1][j], p[i][j + 1], p[i + 1][j + 1]});
-      if (unruly && pick(random, 20) == 0) std::swap(triangles.back()[0], triangles.back()[1]);
-    }
+  std::vector<Triangle> flat = sheet(p);
+  for (std::size_t t = 1; unruly && t < flat.size(); t += 2) {
+    if (pick(random, 20) == 0) std::swap(flat[t][0], flat[t][1]);
   }
+  triangles.insert(triangles.end(), flat.begin(), flat.end());
 }
 
 /// A closed ball with bumps.

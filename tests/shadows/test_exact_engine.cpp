@@ -151,7 +151,7 @@ TEST_CASE(
     CAPTURE(seed);
     Random random(seed);
     constexpr int kSide = 40;
-    std::vector<std::array<dvec3, kSide + 1>> p(kSide + 1);
+    std::vector<std::vector<dvec3>> p(kSide + 1, std::vector<dvec3>(kSide + 1));
     for (int i = 0; i <= kSide; ++i) {
       for (int j = 0; j <= kSide; ++j) {
         const double x = 4.0 * i / kSide - 2.0, z = 4.0 * j / kSide - 2.0;
@@ -159,13 +159,7 @@ TEST_CASE(
         p[i][j] = {x, wave + random.uniform(-0.03, 0.03), z};
       }
     }
-    std::vector<Triangle> triangles;
-    for (int i = 0; i < kSide; ++i) {
-      for (int j = 0; j < kSide; ++j) {
-        triangles.push_back({p[i][j], p[i][j + 1], p[i + 1][j]});
-        triangles.push_back({p[i + 1][j], p[i][j + 1], p[i + 1][j + 1]});
-      }
-    }
+    const std::vector<Triangle> triangles = sheet(p);
     std::vector<Receiver> receivers;
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       const auto& [a, b, c] = triangles[t];

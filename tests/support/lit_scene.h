@@ -90,6 +90,18 @@ inline std::vector<Triangle> random_triangles(Random& random, int count, double 
   return triangles;
 }
 
+/// Two triangles for each quad of a grid of points, of as many rows as columns.
+inline std::vector<Triangle> sheet(const std::vector<std::vector<dvec3>>& p) {
+  std::vector<Triangle> triangles;
+  for (std::size_t i = 0; i + 1 < p.size(); ++i) {
+    for (std::size_t j = 0; j + 1 < p.size(); ++j) {
+      triangles.push_back({p[i][j], p[i][j + 1], p[i + 1][j]});
+      triangles.push_back({p[i + 1][j], p[i][j + 1], p[i + 1][j + 1]});
+    }
+  }
+  return triangles;
+}
+
 inline std::vector<dvec3> random_points(Random& random, int count, double low, double high) {
   std::vector<dvec3> points;
   for (int i = 0; i < count; ++i) points.push_back(random.in_box(low, high));
