@@ -7,6 +7,7 @@
 
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/reuse.h"
+#include "shadows/closed_components.h"
 
 namespace halfshade {
 namespace {
@@ -182,6 +183,9 @@ void set_lane(const LatticeMesh& mesh, std::uint32_t triangle, std::uint32_t lan
     vertices = std::max(vertices, v + 1);
   }
   leaf.triangle[lane] = triangle;
+  const BlockerPlane plane = plane_of(corner);
+  for (int axis = 0; axis < 3; ++axis) leaf.normal[axis][lane] = plane.normal[axis];
+  leaf.side_error[lane] = plane.side_error;
 }
 
 void fill_lanes(const LatticeMesh& mesh, BlockerTree& tree, std::uint32_t index) {
@@ -295,25 +299,28 @@ void trace_groups(BlockerTree& tree) {
   });
 }
 
-void fill_leaf(const KernelSamples& samples, BlockerTree& tree, BlockerTree::Leaf& leaf) {
+std::array<vec3, 3> corners_of(const BlockerTree::Leaf& leaf, std::size_t lane) {
+  std::array<vec3, 3> corners;
+  for (int k = 0; k < 3; ++k) corners[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
+  return corners;
+}
+
+/// What a light makes of the lanes: the sides of their planes that samples lie on, and which certificates count.
+void fill_leaf(const KernelSamples& samples, BlockerTree::Leaf& leaf) {
   leaf.samples_above = leaf.samples_below = leaf.back_faces_only = 0;
   leaf.box_low = vec3(1e30f), leaf.box_high = vec3(-1e30f);
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-    const std::uint32_t place = leaf.first + std::min(lane, leaf.count - 1);  // unused lanes repeat the last triangle
-    if (lane < leaf.count) {
-      std::array<vec3, 3> corners;
-      for (int k = 0; k < 3; ++k)
-        corners[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
-      tree.blockers[place] = make_blocker(corners, (leaf.perforated >> lane) & 1, samples, leaf.triangle[lane]);
-    }
-    const Blocker& b = tree.blockers[place];
-    for (int k = 0; k < 3; ++k) leaf.normal[k][lane] = b.normal[k];
-    leaf.side_error[lane] = b.side_error;
-    leaf.samples_above |= std::uint32_t{b.samples_above} << lane;
-    leaf.samples_below |= std::uint32_t{b.samples_below} << lane;
-    if (!b.back_faces_only) continue;
+    const BlockerPlane plane{{leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}, leaf.side_error[lane]};
+    const SampleSides sides = sides_of_samples(
+        plane, {leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}, samples);
+    leaf.samples_above |= std::uint32_t{sides.samples_above} << lane;
+    leaf.samples_below |= std::uint32_t{sides.samples_below} << lane;
+    if (samples.closed == nullptr) continue;
+    const std::uint32_t component = samples.closed->of_triangle[leaf.triangle[lane]];
+    if (component == kNone || samples.closed_usable[component] == 0) continue;
     leaf.back_faces_only |= 1u << lane;
-    leaf.box_low = glm::min(leaf.box_low, b.box_low), leaf.box_high = glm::max(leaf.box_high, b.box_high);
+    const ClosedComponents::Box& box = samples.closed->boxes[component];
+    leaf.box_low = glm::min(leaf.box_low, box.low), leaf.box_high = glm::max(leaf.box_high, box.high);
   }
 }
 
@@ -331,8 +338,15 @@ Bounds leaf_bounds(const LightFrame& frame, const BlockerTree::Leaf& leaf) {
 
 std::size_t BlockerTree::bytes() const {
   return (order.size() + place.size()) * sizeof(order[0]) + leaves.size() * sizeof(Leaf) + nodes.size() * sizeof(Node) +
-         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) + blockers.size() * sizeof(Blocker) +
-         alpha.size() * sizeof(AlphaTriangle);
+         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) + alpha.size() * sizeof(AlphaTriangle);
+}
+
+Blocker blocker_at(const BlockerTree& tree, const BlockerTree::Leaf& leaf, std::size_t lane,
+                   const KernelSamples& samples) {
+  const bool perforated = (leaf.perforated >> lane & 1) != 0;
+  Blocker b = make_blocker(corners_of(leaf, lane), perforated, samples, leaf.triangle[lane]);
+  if (perforated) b.alpha = &tree.alpha_of(leaf, lane);
+  return b;
 }
 
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree) {
@@ -371,31 +385,30 @@ void copy_tree(const BlockerTree& from, BlockerTree& to) {
 
 void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
                         BlockerTree& tree) {
-  resize_checked(tree.blockers, tree.order.size());
   std::vector<Bounds>&leaf_box = tree.leaf_box, &node_box = tree.node_box;
   leaf_box.resize(tree.leaves.size());
   node_box.assign(tree.nodes.size(), {});
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      fill_leaf(samples, tree, tree.leaves[i]);
+      fill_leaf(samples, tree.leaves[i]);
       leaf_box[i] = leaf_bounds(frame, tree.leaves[i]);
     }
   });
+  std::size_t perforated = 0;
   const auto for_leaves = [&tree](const auto& visit) {
     checked_ranges(tree.leaves.size(), 4096, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i != end; ++i) visit(tree.leaves[i]);
     });
   };
-  std::size_t perforated = 0;
-  for_leaves(
-      [&](const BlockerTree::Leaf& leaf) { perforated += static_cast<std::size_t>(std::popcount(leaf.perforated)); });
+  for_leaves([&](BlockerTree::Leaf& leaf) {
+    leaf.first_alpha = static_cast<std::uint32_t>(perforated);
+    perforated += static_cast<std::size_t>(std::popcount(leaf.perforated));
+  });
   tree.alpha.clear();
-  tree.alpha.reserve(perforated);  // blockers point into it
+  tree.alpha.reserve(perforated);
   for_leaves([&](const BlockerTree::Leaf& leaf) {
-    for (std::uint32_t rest = leaf.perforated; rest != 0; rest &= rest - 1) {
-      Blocker& b = tree.blockers[leaf.first + static_cast<std::uint32_t>(std::countr_zero(rest))];
-      b.alpha = &tree.alpha.emplace_back(make_alpha_triangle(mesh, b.triangle));
-    }
+    for (std::uint32_t rest = leaf.perforated; rest != 0; rest &= rest - 1)
+      tree.alpha.push_back(make_alpha_triangle(mesh, leaf.triangle[std::countr_zero(rest)]));
   });
   for (std::size_t n = tree.nodes.size(); n-- > 0;) {
     if (n % 4096 == 0) check_run();

@@ -5,6 +5,8 @@
 // plane, z along its facing) and refitted for each light.
 #pragma once
 
+#include <bit>
+
 #include "shadows/visibility_pair.h"
 
 namespace halfshade {
@@ -49,6 +51,7 @@ struct BlockerTree {
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
     std::uint32_t vertices = 0;
     std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0, perforated = 0;
+    std::uint32_t first_alpha = 0;          // run of BlockerTree::alpha: one for each perforated lane
     vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
   };
   std::vector<std::uint32_t> order;  // triangles, leaf by leaf
@@ -57,8 +60,7 @@ struct BlockerTree {
   std::vector<Edge> edges;           // of the groups, one after another
   std::vector<vec3> vertices;        // the same; equal ones of a group once
   std::vector<std::uint32_t> place;  // [triangle] 16 x leaf + lane
-  std::vector<Blocker> blockers;     // [place in order], for the light of the last refit
-  std::vector<AlphaTriangle> alpha;  // of the perforated ones
+  std::vector<AlphaTriangle> alpha;  // of the perforated ones, leaf by leaf
 
   /// Scratch of refit_blocker_tree, kept so that refitting again allocates nothing.
   struct Bounds {
@@ -72,8 +74,17 @@ struct BlockerTree {
   };
   std::vector<Bounds> leaf_box, node_box;
 
+  const AlphaTriangle& alpha_of(const Leaf& leaf, std::size_t lane) const {
+    const std::uint32_t before = leaf.perforated & ((1u << lane) - 1);
+    return alpha[leaf.first_alpha + static_cast<std::uint32_t>(std::popcount(before))];
+  }
+
   std::size_t bytes() const;
 };
+
+/// A triangle of a leaf for the kernels that loop over triangles; `samples` are those of the last refit.
+Blocker blocker_at(const BlockerTree& tree, const BlockerTree::Leaf& leaf, std::size_t lane,
+                   const KernelSamples& samples);
 
 /// Order, leaves and topology by binned surface area heuristic. Equal bits for any number of threads.
 void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);

@@ -177,7 +177,7 @@ HWY_INLINE bool TestLeaf(const ExactScene& scene, const BlockerTree::Leaf& leaf,
     const BatchResult batch = TestEdges(pairs, receiver.region, planes);
     for (std::uint64_t rest = batch.candidates; rest != 0; rest &= rest - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-      const Blocker& blocker = scene.tree->blockers[leaf.first + i + lane];
+      const Blocker blocker = blocker_at(*scene.tree, leaf, i + lane, samples);
       const FewSamples few =
           SamplesInRange(*scene.rectangles, receivers.set[receiver.index], receiver, RangeOfLane(ranges, lane));
       TestCandidate(

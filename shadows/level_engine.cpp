@@ -249,7 +249,7 @@ const ExactSide* LevelEngine::side_of(std::span<const std::uint32_t> which, Ligh
   frame = kept_.front;
   if (high < 0.0) frame.n = -frame.n;
   const ExactSide& side = kept_.sides[low > 0.0 ? 0 : 1];
-  return side.fitted && !side.tree.blockers.empty() ? &side : nullptr;
+  return side.fitted && !side.tree.leaves.empty() ? &side : nullptr;
 }
 
 bool LevelEngine::all_lit(std::span<const std::uint32_t> which) const {

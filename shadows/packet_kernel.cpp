@@ -67,7 +67,7 @@ class PacketSolver {
   bool RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafView& view, std::size_t lane);
   void StoreMasks();
 
-  HWY_INLINE void SetPlanes(const BlockerTree::Leaf& leaf, std::size_t lane, PacketTriangle& triangle) const;
+  HWY_INLINE void SetPlanes(PacketTriangle& triangle) const;
   HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const LineSet& lines);
   HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const LineSet& lines, LaneMask below, LaneMask active);
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
@@ -76,6 +76,10 @@ class PacketSolver {
   vec3 Position(std::size_t lane) const {
     const std::size_t i = packet_.first + lane;
     return {receivers_.x[i], receivers_.y[i], receivers_.z[i]};
+  }
+
+  static vec3 Corner(const BlockerTree::Leaf& leaf, std::size_t k, std::size_t lane) {
+    return {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
   }
 
   const ExactScene& scene_;
@@ -269,8 +273,8 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
           const auto i = static_cast<std::size_t>(std::countr_zero(t));
           if (!within(seen.ranges, i, column)) continue;
           ++counters_.exact_fallbacks;
-          const auto& corner = scene_.tree->blockers[leaf.first + i].corner;
-          is_blocked = blocks(corner[0], corner[1], corner[2], Position(lane), scene_.samples->points[first + bit]);
+          is_blocked = blocks(Corner(leaf, 0, i), Corner(leaf, 1, i), Corner(leaf, 2, i), Position(lane),
+                              scene_.samples->points[first + bit]);
         }
       }
       blocked[lane] |= std::uint32_t{is_blocked} << bit;
@@ -319,8 +323,7 @@ bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupVie
 }
 
 /// The planes through receivers and edges, and the triangle's own where it cuts the light.
-HWY_INLINE void PacketSolver::SetPlanes(const BlockerTree::Leaf& leaf, std::size_t lane,
-                                        PacketTriangle& triangle) const {
+HWY_INLINE void PacketSolver::SetPlanes(PacketTriangle& triangle) const {
   const Tag d;
   const Vec3 axis_x = Splat(rows_.axis_x), axis_y = Splat(rows_.axis_y);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -333,12 +336,13 @@ HWY_INLINE void PacketSolver::SetPlanes(const BlockerTree::Leaf& leaf, std::size
     triangle.planes[k] = SolveForX(rows_, Dot(m, axis_x), Dot(m, axis_y), Dot(m, packet_.to_center), error);
   }
   triangle.count = 3;
-  if (((leaf.samples_above & leaf.samples_below) >> lane & 1) == 0) return;
-  const Blocker& b = *triangle.blocker;
-  const float error = b.plane_error + b.side_error * (rows_.deviation / kDeterminantError);
-  triangle.planes[3] =
-      SolveForX(rows_, hn::Set(d, glm::dot(b.normal, rows_.axis_x)), hn::Set(d, glm::dot(b.normal, rows_.axis_y)),
-                hn::Set(d, b.plane_at_center), hn::Set(d, error));
+  if (!triangle.samples_above || !triangle.samples_below) return;
+  const BlockerPlane& plane = triangle.plane;
+  const SampleSides sides = sides_of_samples(plane, triangle.corner[0], *scene_.samples);
+  const float error = sides.plane_error + plane.side_error * (rows_.deviation / kDeterminantError);
+  triangle.planes[3] = SolveForX(rows_, hn::Set(d, glm::dot(plane.normal, rows_.axis_x)),
+                                 hn::Set(d, glm::dot(plane.normal, rows_.axis_y)),
+                                 hn::Set(d, sides.plane_at_center), hn::Set(d, error));
   triangle.count = 4;
 }
 
@@ -353,12 +357,12 @@ HWY_INLINE std::array<LaneMask, 4> PacketSolver::Orient(const PacketTriangle& tr
 /// triangle hides nothing out of `active`.
 HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, LaneMask& active, const LineSet& lines) {
   const Tag d;
-  const Blocker& b = *triangle.blocker;
+  const BlockerPlane& plane = triangle.plane;
   const Vec3 to_corner = Subtract(Splat(triangle.corner[0]), packet_.position);
-  const Vec side = Dot(Splat(b.normal), to_corner), error = hn::Mul(hn::Set(d, b.side_error), Norm1(to_corner));
+  const Vec side = Dot(Splat(plane.normal), to_corner), error = hn::Mul(hn::Set(d, plane.side_error), Norm1(to_corner));
   LaneMask below = hn::Lt(side, hn::Neg(error));
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
-  LaneMask wanted = hn::Or(b.samples_above ? hn::Gt(side, error) : none, b.samples_below ? below : none);
+  LaneMask wanted = hn::Or(triangle.samples_above ? hn::Gt(side, error) : none, triangle.samples_below ? below : none);
   const LaneMask unknown = hn::And(active, hn::Le(hn::Abs(side), error));
   if (!hn::AllFalse(d, unknown)) {
     // Only the exact predicate can tell; it is asked for receivers that would lose something one way or the other.
@@ -379,7 +383,7 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
       ++counters_.exact_fallbacks;
       const int sign = orient3d(triangle.corner[0], triangle.corner[1], triangle.corner[2], Position(lane));
-      if (sign == 0 || !(sign < 0 ? b.samples_below : b.samples_above)) continue;
+      if (sign == 0 || !(sign < 0 ? triangle.samples_below : triangle.samples_above)) continue;
       const LaneMask this_lane = LanesFromBits(1u << lane, 0);
       wanted = hn::Or(wanted, this_lane);
       if (sign < 0) below = hn::Or(below, this_lane);
@@ -402,8 +406,8 @@ void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, co
       ++counters_.exact_fallbacks;
       inside[lane] |= std::uint32_t{blocks(a, b, c, Position(lane), scene_.samples->points[first + bit])} << bit;
     }
-    if (!triangle.perforated || inside[lane] == 0) continue;
-    const AlphaTriangle& alpha = *triangle.blocker->alpha;
+    if (triangle.alpha == nullptr || inside[lane] == 0) continue;
+    const AlphaTriangle& alpha = *triangle.alpha;
     if (!texels_[lane]) texels_[lane].emplace(alpha, Position(lane));
     inside[lane] = OpaqueSamples(alpha, *texels_[lane], Position(lane), &rows_.point_x[first], &rows_.point_y[first],
                                  &rows_.point_z[first], inside[lane], counters_.exact_fallbacks);
@@ -426,7 +430,7 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Li
     ++counters_.sample_tests;
     if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return;
     UintVec inside = hn::And(asked, outline.inside(y, offset, rest));
-    if (triangle.perforated || !hn::AllTrue(du, hn::Eq(possible, inside))) {
+    if (triangle.alpha != nullptr || !hn::AllTrue(du, hn::Eq(possible, inside))) {
       alignas(HWY_MAX_BYTES) std::uint32_t may[kMaxLanes], does[kMaxLanes];
       hn::Store(possible, du, may), hn::Store(inside, du, does);
       Settle(triangle, line, may, does);
@@ -460,13 +464,12 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafVi
   }
   if (hn::AllFalse(d, active)) return false;
   PacketTriangle triangle;
-  triangle.blocker = &scene_.tree->blockers[leaf.first + lane];
-  triangle.perforated = (leaf.perforated >> lane) & 1;
-  if (triangle.perforated) std::fill(std::begin(texels_), std::end(texels_), std::nullopt);
-  for (std::size_t k = 0; k < 3; ++k) {
-    triangle.corner[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
-  }
-  SetPlanes(leaf, lane, triangle);
+  triangle.alpha = (leaf.perforated >> lane & 1) != 0 ? &scene_.tree->alpha_of(leaf, lane) : nullptr;
+  if (triangle.alpha != nullptr) std::fill(std::begin(texels_), std::end(texels_), std::nullopt);
+  for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = Corner(leaf, k, lane);
+  triangle.plane = {{leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}, leaf.side_error[lane]};
+  triangle.samples_above = leaf.samples_above >> lane & 1, triangle.samples_below = leaf.samples_below >> lane & 1;
+  SetPlanes(triangle);
   const bool above = (view.above >> lane) & 1, below = (view.below >> lane) & 1;
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
   LaneMask is_below = below ? hn::Not(none) : none;

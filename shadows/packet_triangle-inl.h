@@ -48,9 +48,10 @@ HWY_INLINE HalfPlane SolveForX(const SampleRows& rows, Vec a, Vec b, Vec c, Vec 
 
 /// A triangle before it is rasterized.
 struct PacketTriangle {
-  const Blocker* blocker;  // for the exact predicate and textures
   std::array<vec3, 3> corner;
-  bool perforated;
+  BlockerPlane plane;
+  bool samples_above, samples_below;  // some sample may lie on that side of the plane
+  const AlphaTriangle* alpha;         // null where it is opaque
   std::array<HalfPlane, 4> planes;  // through receiver and edge, oriented for a plane above the receiver; its own plane
   std::size_t count;                // 3; 4 where samples lie on both sides of its plane
 };

@@ -48,8 +48,6 @@ void prepare(const Light& light, TransmittancePass& pass) {
   for (const vec3& p : samples.points) pass.light.add(p);
   build_blocker_tree(pass.panes.mesh, pass.tree);
   refit_blocker_tree(pass.panes.mesh, pass.kernel, LightFrame(), pass.tree);
-  // No pane may take the shortcut that marks a receiver as hidden: each of its samples is to be settled.
-  for (Blocker& b : pass.tree.blockers) b.perforated = true;
 }
 
 void make_room(const TransmittancePass& pass, std::size_t size, TransmittanceTile& tile) {

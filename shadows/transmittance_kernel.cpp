@@ -60,8 +60,10 @@ void CrossPanes(const Panes& panes, const BlockerTree& tree, std::span<const std
                 const KernelSamples& samples, TransmittanceTile& tile) {
   for (const std::uint32_t l : leaves) {
     const BlockerTree::Leaf& leaf = tree.leaves[l];
-    for (std::uint32_t i = leaf.first; i < leaf.first + leaf.count; ++i) {
-      CrossPane(panes, tree.blockers[i], samples, tile);
+    for (std::uint32_t i = 0; i < leaf.count; ++i) {
+      Blocker pane = blocker_at(tree, leaf, i, samples);
+      pane.perforated = true;  // not the shortcut that marks a receiver as hidden: each of its samples is to be settled
+      CrossPane(panes, pane, samples, tile);
     }
   }
 }

@@ -142,6 +142,23 @@ void restore_sample_order(const KernelSamples& samples, std::uint32_t set, std::
   }
 }
 
+BlockerPlane plane_of(const std::array<vec3, 3>& corners) {
+  const vec3 a = corners[1] - corners[0], b = corners[2] - corners[1];
+  return {glm::cross(a, b), kDeterminantError * norm1(a) * norm1(b)};
+}
+
+SampleSides sides_of_samples(const BlockerPlane& plane, const vec3& corner, const KernelSamples& samples) {
+  SampleSides sides;
+  const vec3 to_center = samples.center - corner;
+  sides.plane_at_center = glm::dot(plane.normal, to_center);
+  sides.plane_error = plane.side_error * (norm_max(to_center) + samples.reach);
+  float reach = sides.plane_error;
+  for (const vec3& h : samples.half_axes) reach += std::fabs(glm::dot(plane.normal, h));
+  sides.samples_above = sides.plane_at_center + reach >= 0.0f;
+  sides.samples_below = sides.plane_at_center - reach <= 0.0f;
+  return sides;
+}
+
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle) {
   return make_blocker(mesh.corners(triangle), mesh.alpha_map(triangle) != kNone, samples, triangle);
 }
@@ -155,15 +172,11 @@ Blocker make_blocker(const std::array<vec3, 3>& corners, bool perforated, const 
     b.edge[k] = b.corner[(k + 1) % 3] - b.corner[k];
     b.edge_error[k] = kDeterminantError * norm1(b.edge[k]);
   }
-  b.normal = glm::cross(b.edge[0], b.edge[1]);
-  b.side_error = b.edge_error[0] * norm1(b.edge[1]);
-  const vec3 to_center = samples.center - b.corner[0];
-  b.plane_at_center = glm::dot(b.normal, to_center);
-  b.plane_error = b.side_error * (norm_max(to_center) + samples.reach);
-  float reach = b.plane_error;
-  for (const vec3& h : samples.half_axes) reach += std::fabs(glm::dot(b.normal, h));
-  b.samples_above = b.plane_at_center + reach >= 0.0f;
-  b.samples_below = b.plane_at_center - reach <= 0.0f;
+  const BlockerPlane plane = plane_of(corners);
+  b.normal = plane.normal, b.side_error = plane.side_error;
+  const SampleSides sides = sides_of_samples(plane, b.corner[0], samples);
+  b.plane_at_center = sides.plane_at_center, b.plane_error = sides.plane_error;
+  b.samples_above = sides.samples_above, b.samples_below = sides.samples_below;
   b.all_above = !b.samples_below;
   b.all_below = !b.samples_above;
   if (samples.closed != nullptr && samples.closed->of_triangle[triangle] != kNone) {

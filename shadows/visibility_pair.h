@@ -29,6 +29,20 @@ struct Blocker {
   const AlphaTriangle* alpha = nullptr;             // set by the caller of make_blocker for perforated ones
 };
 
+/// The plane of a triangle, as in Blocker.
+struct BlockerPlane {
+  vec3 normal{0.0f};
+  float side_error = 0.0f;
+};
+BlockerPlane plane_of(const std::array<vec3, 3>& corners);
+
+/// Where the samples lie of a plane through `corner`, as in Blocker.
+struct SampleSides {
+  float plane_at_center = 0.0f, plane_error = 0.0f;
+  bool samples_above = true, samples_below = true;
+};
+SampleSides sides_of_samples(const BlockerPlane& plane, const vec3& corner, const KernelSamples& samples);
+
 Blocker make_blocker(const LatticeMesh& mesh, const KernelSamples& samples, std::uint32_t triangle);
 /// The same of corners at hand.
 Blocker make_blocker(const std::array<vec3, 3>& corners, bool perforated, const KernelSamples& samples,
