@@ -306,21 +306,21 @@ std::array<vec3, 3> corners_of(const BlockerTree::Leaf& leaf, std::size_t lane) 
 }
 
 /// What a light makes of the lanes: the sides of their planes that samples lie on, and which certificates count.
-void fill_leaf(const KernelSamples& samples, BlockerTree::Leaf& leaf) {
-  leaf.samples_above = leaf.samples_below = leaf.back_faces_only = 0;
-  leaf.box_low = vec3(1e30f), leaf.box_high = vec3(-1e30f);
+void fit_leaf(const BlockerTree::Leaf& leaf, const KernelSamples& samples, BlockerFit::Leaf& fit) {
+  fit.samples_above = fit.samples_below = fit.back_faces_only = 0;
+  fit.box_low = vec3(1e30f), fit.box_high = vec3(-1e30f);
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
     const BlockerPlane plane{{leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}, leaf.side_error[lane]};
-    const SampleSides sides = sides_of_samples(
-        plane, {leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}, samples);
-    leaf.samples_above |= std::uint32_t{sides.samples_above} << lane;
-    leaf.samples_below |= std::uint32_t{sides.samples_below} << lane;
+    const SampleSides sides =
+        sides_of_samples(plane, {leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}, samples);
+    fit.samples_above |= std::uint32_t{sides.samples_above} << lane;
+    fit.samples_below |= std::uint32_t{sides.samples_below} << lane;
     if (samples.closed == nullptr) continue;
     const std::uint32_t component = samples.closed->of_triangle[leaf.triangle[lane]];
     if (component == kNone || samples.closed_usable[component] == 0) continue;
-    leaf.back_faces_only |= 1u << lane;
+    fit.back_faces_only |= 1u << lane;
     const ClosedComponents::Box& box = samples.closed->boxes[component];
-    leaf.box_low = glm::min(leaf.box_low, box.low), leaf.box_high = glm::max(leaf.box_high, box.high);
+    fit.box_low = glm::min(fit.box_low, box.low), fit.box_high = glm::max(fit.box_high, box.high);
   }
 }
 
@@ -338,14 +338,21 @@ Bounds leaf_bounds(const LightFrame& frame, const BlockerTree::Leaf& leaf) {
 
 std::size_t BlockerTree::bytes() const {
   return (order.size() + place.size()) * sizeof(order[0]) + leaves.size() * sizeof(Leaf) + nodes.size() * sizeof(Node) +
-         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) + alpha.size() * sizeof(AlphaTriangle);
+         edges.size() * sizeof(Edge) + vertices.size() * sizeof(vec3) +
+         (leaf_box.size() + node_box.size()) * sizeof(Bounds);
 }
 
-Blocker blocker_at(const BlockerTree& tree, const BlockerTree::Leaf& leaf, std::size_t lane,
+std::size_t BlockerFit::bytes() const {
+  return nodes.size() * sizeof(BlockerTree::Node) + leaves.size() * sizeof(Leaf) +
+         alpha.size() * sizeof(AlphaTriangle) + (leaf_box.size() + node_box.size()) * sizeof(Bounds);
+}
+
+Blocker blocker_at(const BlockerTree& tree, const BlockerFit& fit, std::size_t leaf, std::size_t lane,
                    const KernelSamples& samples) {
-  const bool perforated = (leaf.perforated >> lane & 1) != 0;
-  Blocker b = make_blocker(corners_of(leaf, lane), perforated, samples, leaf.triangle[lane]);
-  if (perforated) b.alpha = &tree.alpha_of(leaf, lane);
+  const BlockerTree::Leaf& l = tree.leaves[leaf];
+  const bool perforated = (l.perforated >> lane & 1) != 0;
+  Blocker b = make_blocker(corners_of(l, lane), perforated, samples, l.triangle[lane]);
+  if (perforated) b.alpha = &fit.alpha_of(tree, leaf, lane);
   return b;
 }
 
@@ -377,48 +384,42 @@ void place_blockers(const LatticeMesh& mesh, BlockerTree& tree) {
   trace_groups(tree);
 }
 
-void copy_tree(const BlockerTree& from, BlockerTree& to) {
-  copy_checked(from.order, to.order), copy_checked(from.place, to.place);
-  copy_checked(from.leaves, to.leaves), copy_checked(from.nodes, to.nodes);
-  copy_checked(from.edges, to.edges), copy_checked(from.vertices, to.vertices);
-}
-
-void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
-                        BlockerTree& tree) {
-  std::vector<Bounds>&leaf_box = tree.leaf_box, &node_box = tree.node_box;
-  leaf_box.resize(tree.leaves.size());
-  node_box.assign(tree.nodes.size(), {});
+void fit_blocker_tree(const LatticeMesh& mesh, const BlockerTree& tree, const KernelSamples& samples,
+                      const LightFrame& frame, BlockerFit& fit) {
+  copy_checked(tree.nodes, fit.nodes);
+  resize_checked(fit.leaves, tree.leaves.size()), resize_checked(fit.leaf_box, tree.leaves.size());
+  fit.node_box.assign(tree.nodes.size(), {});
   parallel_ranges(tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      fill_leaf(samples, tree.leaves[i]);
-      leaf_box[i] = leaf_bounds(frame, tree.leaves[i]);
+      fit_leaf(tree.leaves[i], samples, fit.leaves[i]);
+      fit.leaf_box[i] = leaf_bounds(frame, tree.leaves[i]);
     }
   });
-  std::size_t perforated = 0;
   const auto for_leaves = [&tree](const auto& visit) {
     checked_ranges(tree.leaves.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i != end; ++i) visit(tree.leaves[i]);
+      for (std::size_t i = begin; i != end; ++i) visit(i, tree.leaves[i]);
     });
   };
-  for_leaves([&](BlockerTree::Leaf& leaf) {
-    leaf.first_alpha = static_cast<std::uint32_t>(perforated);
+  std::size_t perforated = 0;
+  for_leaves([&](std::size_t i, const BlockerTree::Leaf& leaf) {
+    fit.leaves[i].first_alpha = static_cast<std::uint32_t>(perforated);
     perforated += static_cast<std::size_t>(std::popcount(leaf.perforated));
   });
-  tree.alpha.clear();
-  tree.alpha.reserve(perforated);
-  for_leaves([&](const BlockerTree::Leaf& leaf) {
+  fit.alpha.clear();
+  fit.alpha.reserve(perforated);
+  for_leaves([&](std::size_t, const BlockerTree::Leaf& leaf) {
     for (std::uint32_t rest = leaf.perforated; rest != 0; rest &= rest - 1)
-      tree.alpha.push_back(make_alpha_triangle(mesh, leaf.triangle[std::countr_zero(rest)]));
+      fit.alpha.push_back(make_alpha_triangle(mesh, leaf.triangle[std::countr_zero(rest)]));
   });
-  for (std::size_t n = tree.nodes.size(); n-- > 0;) {
+  for (std::size_t n = fit.nodes.size(); n-- > 0;) {
     if (n % 4096 == 0) check_run();
-    BlockerTree::Node& node = tree.nodes[n];
+    BlockerTree::Node& node = fit.nodes[n];
     for (std::uint32_t i = 0; i < kWidth; ++i) {
       Bounds box;  // empty for unused children: no shaft meets it
       if (i < node.count) {
         const std::uint32_t child = node.child[i];
-        box = child & BlockerTree::kLeafBit ? leaf_box[child & ~BlockerTree::kLeafBit] : node_box[child];
-        node_box[n].add(box);
+        box = child & BlockerTree::kLeafBit ? fit.leaf_box[child & ~BlockerTree::kLeafBit] : fit.node_box[child];
+        fit.node_box[n].add(box);
       }
       for (int axis = 0; axis < 3; ++axis) node.low[axis][i] = box.low[axis], node.high[axis][i] = box.high[axis];
     }

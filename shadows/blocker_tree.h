@@ -1,8 +1,9 @@
 // Tree over blockers for receivers that gather: leaves of up to 16 triangles laid out for SIMD, nodes of up to 16
 // boxes.
 //
-// Topology and order depend on the mesh alone. The boxes are axis-aligned in the light's frame (u, v in the light's
-// plane, z along its facing) and refitted for each light.
+// Topology and order depend on the mesh alone, and a tree serves all lights. Each light has a fit of its own: boxes
+// that are axis-aligned in its frame (u, v in its plane, z along its facing), and the sides of triangles that it shines
+// on.
 #pragma once
 
 #include <bit>
@@ -25,8 +26,8 @@ struct BlockerTree {
   static constexpr std::uint32_t kLeafBit = 0x80000000u;
   static constexpr std::uint32_t kGroupSlots = kWidth * kWidth;
 
-  /// Bounds of 16 children, [axis][child], light frame; child = node, or leaf with kLeafBit. The lowest nodes are
-  /// groups: their children are leaves, one after another. The root is no group.
+  /// Bounds of 16 children, [axis][child], light frame, which only a fit knows; child = node, or leaf with kLeafBit.
+  /// The lowest nodes are groups: their children are leaves, one after another. The root is no group.
   struct alignas(64) Node {
     float low[3][kWidth], high[3][kWidth];
     std::uint32_t child[kWidth];
@@ -49,10 +50,7 @@ struct BlockerTree {
     float normal[3][kWidth], side_error[kWidth];
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
-    std::uint32_t vertices = 0;
-    std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0, perforated = 0;
-    std::uint32_t first_alpha = 0;          // run of BlockerTree::alpha: one for each perforated lane
-    vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
+    std::uint32_t vertices = 0, perforated = 0;
   };
   std::vector<std::uint32_t> order;  // triangles, leaf by leaf
   std::vector<Leaf> leaves;
@@ -60,9 +58,8 @@ struct BlockerTree {
   std::vector<Edge> edges;           // of the groups, one after another
   std::vector<vec3> vertices;        // the same; equal ones of a group once
   std::vector<std::uint32_t> place;  // [triangle] 16 x leaf + lane
-  std::vector<AlphaTriangle> alpha;  // of the perforated ones, leaf by leaf
 
-  /// Scratch of refit_blocker_tree, kept so that refitting again allocates nothing.
+  /// Scratch of tree_cost, kept so that asking again allocates nothing.
   struct Bounds {
     vec3 low{1e30f}, high{-1e30f};
     void add(const vec3& p) { low = glm::min(low, p), high = glm::max(high, p); }
@@ -74,16 +71,33 @@ struct BlockerTree {
   };
   std::vector<Bounds> leaf_box, node_box;
 
-  const AlphaTriangle& alpha_of(const Leaf& leaf, std::size_t lane) const {
-    const std::uint32_t before = leaf.perforated & ((1u << lane) - 1);
-    return alpha[leaf.first_alpha + static_cast<std::uint32_t>(std::popcount(before))];
-  }
-
   std::size_t bytes() const;
 };
 
-/// A triangle of a leaf for the kernels that loop over triangles; `samples` are those of the last refit.
-Blocker blocker_at(const BlockerTree& tree, const BlockerTree::Leaf& leaf, std::size_t lane,
+/// A tree as one side of a light sees it.
+struct BlockerFit {
+  /// Bit masks say what holds for a lane.
+  struct Leaf {
+    std::uint32_t samples_above = 0, samples_below = 0, back_faces_only = 0;
+    std::uint32_t first_alpha = 0;       // run of `alpha`: one for each perforated lane
+    vec3 box_low{0.0f}, box_high{0.0f};  // around the components of the lanes in back_faces_only
+  };
+  std::vector<BlockerTree::Node> nodes;  // of the tree, with bounds
+  std::vector<Leaf> leaves;
+  std::vector<AlphaTriangle> alpha;  // of the perforated triangles, leaf by leaf
+
+  /// Scratch of fit_blocker_tree, kept so that fitting again allocates nothing.
+  std::vector<BlockerTree::Bounds> leaf_box, node_box;
+
+  const AlphaTriangle& alpha_of(const BlockerTree& tree, std::size_t leaf, std::size_t lane) const {
+    const std::uint32_t before = tree.leaves[leaf].perforated & ((1u << lane) - 1);
+    return alpha[leaves[leaf].first_alpha + static_cast<std::uint32_t>(std::popcount(before))];
+  }
+  std::size_t bytes() const;
+};
+
+/// A triangle of a leaf for the kernels that loop over triangles; `samples` are those that were fitted to.
+Blocker blocker_at(const BlockerTree& tree, const BlockerFit& fit, std::size_t leaf, std::size_t lane,
                    const KernelSamples& samples);
 
 /// Order, leaves and topology by binned surface area heuristic. Equal bits for any number of threads.
@@ -93,11 +107,8 @@ void build_blocker_tree(const LatticeMesh& mesh, BlockerTree& tree);
 /// built.
 void place_blockers(const LatticeMesh& mesh, BlockerTree& tree);
 
-/// All that does not depend on a light; what `to` holds beside it stays as scratch.
-void copy_tree(const BlockerTree& from, BlockerTree& to);
-
-/// Blockers and bounds for a light.
-void refit_blocker_tree(const LatticeMesh& mesh, const KernelSamples& samples, const LightFrame& frame,
-                        BlockerTree& tree);
+/// The tree of `mesh` for one side of a light; what `fit` held before gives its memory.
+void fit_blocker_tree(const LatticeMesh& mesh, const BlockerTree& tree, const KernelSamples& samples,
+                      const LightFrame& frame, BlockerFit& fit);
 
 }  // namespace halfshade

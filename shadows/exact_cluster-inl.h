@@ -71,13 +71,13 @@ HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const 
 
 /// Leaves or, where `kGroups`, groups (nodes) whose box meets the cluster's shaft, into scratch.leaf.
 template <bool kGroups>
-HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, ExactScratch& scratch) {
+HWY_INLINE void CollectLeaves(const BlockerFit& fit, const Shaft& shaft, ExactScratch& scratch) {
   const std::size_t lanes = hn::Lanes(Tag());
   scratch.leaf.clear();
   for (int k = 0; k < 3; ++k) scratch.low[k].clear(), scratch.high[k].clear();
   scratch.stack.assign(1, 0);
   while (!scratch.stack.empty()) {
-    const BlockerTree::Node& node = tree.nodes[scratch.stack.back()];
+    const BlockerTree::Node& node = fit.nodes[scratch.stack.back()];
     scratch.stack.pop_back();
     const float* const low[3] = {node.low[0], node.low[1], node.low[2]};
     const float* const high[3] = {node.high[0], node.high[1], node.high[2]};
@@ -87,7 +87,7 @@ HWY_INLINE void CollectLeaves(const BlockerTree& tree, const Shaft& shaft, Exact
         if (at >= node.count) continue;
         const std::uint32_t child = node.child[at] & ~BlockerTree::kLeafBit;
         const bool is_leaf = child != node.child[at];
-        if (!is_leaf && !(kGroups && tree.nodes[child].is_group)) {
+        if (!is_leaf && !(kGroups && fit.nodes[child].is_group)) {
           scratch.stack.push_back(child);
           continue;
         }
@@ -141,19 +141,20 @@ HWY_INLINE LaneMask LanesFromBits(std::uint32_t bits, std::size_t first) {
   return hn::LoadMaskBits(d, bytes);
 }
 
-HWY_INLINE bool OutsideBox(const vec3& p, const BlockerTree::Leaf& leaf) {
+HWY_INLINE bool OutsideBox(const vec3& p, const BlockerFit::Leaf& leaf) {
   return p.x < leaf.box_low.x || p.y < leaf.box_low.y || p.z < leaf.box_low.z || p.x > leaf.box_high.x ||
          p.y > leaf.box_high.y || p.z > leaf.box_high.z;
 }
 
 /// Lanes of a leaf that could hide something from a receiver: not its own triangle, facing so that some sample lies on
 /// the other side of the plane. Fills what `pairs` needs for the edges later; returns the lanes as bits.
-HWY_INLINE std::uint64_t FacingLanes(const BlockerTree::Leaf& leaf, std::size_t i, const vec3& position,
-                                     std::uint32_t own, PairLanes& pairs, std::array<Vec3, 3>& corner) {
+HWY_INLINE std::uint64_t FacingLanes(const BlockerTree::Leaf& leaf, const BlockerFit::Leaf& fit, std::size_t i,
+                                     const vec3& position, std::uint32_t own, PairLanes& pairs,
+                                     std::array<Vec3, 3>& corner) {
   const Tag d;
   const UintTag du;
   const Vec3 r = Splat(position);
-  const std::uint32_t no_front = OutsideBox(position, leaf) ? leaf.back_faces_only : 0;
+  const std::uint32_t no_front = OutsideBox(position, fit) ? fit.back_faces_only : 0;
   for (std::size_t k = 0; k < 3; ++k) {
     corner[k] = {hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i),
                  hn::LoadU(d, leaf.corner[k][2] + i)};
@@ -167,8 +168,8 @@ HWY_INLINE std::uint64_t FacingLanes(const BlockerTree::Leaf& leaf, std::size_t 
   pairs.below = hn::Lt(side, hn::Neg(side_error));
   pairs.unknown = hn::Not(hn::Or(above, pairs.below));
   const LaneMask facing =
-      hn::Or(pairs.unknown, hn::Or(hn::And(above, LanesFromBits(leaf.samples_above, i)),
-                                   hn::And(pairs.below, LanesFromBits(leaf.samples_below & ~no_front, i))));
+      hn::Or(pairs.unknown, hn::Or(hn::And(above, LanesFromBits(fit.samples_above, i)),
+                                   hn::And(pairs.below, LanesFromBits(fit.samples_below & ~no_front, i))));
   const auto other = hn::Ne(hn::LoadU(du, leaf.triangle + i), hn::Set(du, own));
   pairs.active = hn::And(hn::And(hn::FirstN(d, leaf.count - i), facing), hn::RebindMask(d, other));
   return Bits(pairs.active);
@@ -236,7 +237,7 @@ HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size
   const vec2 low = scene.rectangles->whole_low, high = scene.rectangles->whole_high;
   const float pad = ProjectionPad(shaft.low[2]);
   shaft.light = {low.x - pad, low.y - pad, high.x + pad, high.y + pad};
-  CollectLeaves<kGroups>(*scene.tree, shaft, scratch);
+  CollectLeaves<kGroups>(*scene.fit, shaft, scratch);
   scratch.leaves_listed += scratch.leaf.size();
   if (scratch.leaf.empty()) {
     ++scratch.clusters_lit;

@@ -105,12 +105,7 @@ void add_counters(const ScratchPool& scratches, ShadowStats& stats) {
 void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, const LightFrame& frame, ExactSide& side) {
   if (side.fitted && side.usable == samples.closed_usable) return;
   side.fitted = false;
-  if (blockers.tree != nullptr && side.tree_version != blockers.tree_version) {
-    side.tree_version = 0;
-    copy_tree(*blockers.tree, side.tree);
-    side.tree_version = blockers.tree_version;
-  }
-  refit_blocker_tree(blockers.mesh, samples, frame, side.tree);
+  fit_blocker_tree(blockers.mesh, *blockers.tree, samples, frame, side.fit);
   side.usable = samples.closed_usable;
   side.fitted = true;
 }
@@ -151,7 +146,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   stats.index_ms += watch.lap();
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
-  const ExactScene scene{&side.tree, &samples, &kept.rectangles, &rows, frame};
+  const ExactScene scene{blockers.tree, &side.fit, &samples, &kept.rectangles, &rows, frame};
   const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
@@ -169,8 +164,8 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   }
   if (rows.empty()) scatter_masks(kernel, samples, order, masks);
   add_counters(work.scratches, stats);
-  stats.bytes =
-      std::max<std::uint64_t>(stats.bytes, side.tree.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
+  stats.bytes = std::max<std::uint64_t>(
+      stats.bytes, blockers.tree->bytes() + side.fit.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
   stats.test_ms += watch.lap();
 }
 
@@ -278,7 +273,6 @@ void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, 
   solve_grazing(blockers.mesh, receivers, light, samples, kept.front, config, masks, stats);
   if (samples.one_sided) return;
   const LightFrame back{kept.front.origin, kept.front.u, kept.front.v, -kept.front.n};
-  if (blockers.tree == nullptr) std::swap(kept.sides[0].tree, kept.sides[1].tree);
   solve_side(blockers, receivers, back, config, kept, kept.sides[1], work, masks, stats);
 }
 
@@ -294,9 +288,10 @@ void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const 
   ClosedComponents closed;
   prepare_exact_light(light, samples, kept);
   if (config.back_face_casters) closed = find_closed_components(mesh);
-  build_blocker_tree(mesh, kept.sides[0].tree);
+  BlockerTree tree;
+  build_blocker_tree(mesh, tree);
   stats.build_ms += watch.lap();
-  const ExactBlockers blockers{mesh, config.back_face_casters ? &closed : nullptr};
+  const ExactBlockers blockers{mesh, config.back_face_casters ? &closed : nullptr, &tree};
   solve_exact(blockers, receivers, light, samples, config, kept, work, masks, stats);
 }
 

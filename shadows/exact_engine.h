@@ -20,16 +20,14 @@ namespace halfshade {
 struct ExactBlockers {
   const LatticeMesh& mesh;
   const ClosedComponents* closed = nullptr;  // null: both sides of all triangles cast
-  const BlockerTree* tree = nullptr;         // as built or placed; null: ExactSide::tree is
-  std::uint64_t tree_version = 1;            // changes with the tree; not 0
+  const BlockerTree* tree = nullptr;         // as built or placed
 };
 
 /// One side of a light and the blockers as it sees them.
 struct ExactSide {
-  BlockerTree tree;
-  bool fitted = false;               // the tree belongs to the light's samples and to the blockers
-  std::vector<std::uint8_t> usable;  // the certificates that the tree was fitted with
-  std::uint64_t tree_version = 0;    // which tree it is a copy of; 0 = none
+  BlockerFit fit;
+  bool fitted = false;               // it belongs to the light's samples and to the blockers
+  std::vector<std::uint8_t> usable;  // the certificates that it was made with
 };
 
 /// What the engine makes of a light, to be kept from call to call.
@@ -41,13 +39,8 @@ struct ExactLight {
   SampleRectangles rectangles;  // the same from both sides
   std::array<ExactSide, 2> sides;
 
-  /// The blockers moved.
+  /// The blockers are others, or moved.
   void unfit() { sides[0].fitted = sides[1].fitted = false; }
-  /// The blockers are those of another scene.
-  void forget_blockers() {
-    unfit();
-    sides[0].tree_version = sides[1].tree_version = 0;
-  }
 };
 
 /// One for each thread at work, kept from call to call.

@@ -154,16 +154,18 @@ HWY_INLINE bool TestFewSamples(const Blocker& blocker, const KernelSamples& samp
 }
 
 /// Up to 16 triangles against the open part of the light; true where bits were added.
-HWY_INLINE bool TestLeaf(const ExactScene& scene, const BlockerTree::Leaf& leaf, const OpenReceiver& receiver,
+HWY_INLINE bool TestLeaf(const ExactScene& scene, std::size_t index, const OpenReceiver& receiver,
                          KernelReceivers& receivers, EdgePlanes& planes, KernelCounters& counters) {
   const std::size_t lanes = hn::Lanes(Tag());
   const KernelSamples& samples = *scene.samples;
+  const BlockerTree::Leaf& leaf = scene.tree->leaves[index];
   const std::uint64_t before = counters.pairs_necessary;
   counters.pairs_tested += leaf.count;
   for (std::size_t i = 0; i < leaf.count; i += lanes) {
     PairLanes pairs;
     std::array<Vec3, 3> corner;
-    std::uint64_t active = FacingLanes(leaf, i, receiver.position, receivers.own[receiver.index], pairs, corner);
+    std::uint64_t active =
+        FacingLanes(leaf, scene.fit->leaves[index], i, receiver.position, receivers.own[receiver.index], pairs, corner);
     if (active == 0) continue;
     BinRanges ranges;
     RangesOf(*scene.rectangles, ProjectTriangles(scene.frame, pairs.to_corner, receiver.shaft), ranges);
@@ -177,7 +179,7 @@ HWY_INLINE bool TestLeaf(const ExactScene& scene, const BlockerTree::Leaf& leaf,
     const BatchResult batch = TestEdges(pairs, receiver.region, planes);
     for (std::uint64_t rest = batch.candidates; rest != 0; rest &= rest - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-      const Blocker blocker = blocker_at(*scene.tree, leaf, i + lane, samples);
+      const Blocker blocker = blocker_at(*scene.tree, *scene.fit, index, i + lane, samples);
       const FewSamples few =
           SamplesInRange(*scene.rectangles, receivers.set[receiver.index], receiver, RangeOfLane(ranges, lane));
       TestCandidate(
@@ -229,8 +231,7 @@ HWY_INLINE void SolveReceiver(const ExactScene& scene, std::size_t index, Kernel
   EdgePlanes planes;
   for (std::size_t i = 0; i < scratch.leaf.size(); i += lanes) {
     for (std::uint64_t bits = Bits(MeetsShaft(receiver.shaft, low, high, i)); bits != 0; bits &= bits - 1) {
-      const BlockerTree::Leaf& leaf =
-          scene.tree->leaves[scratch.leaf[i + static_cast<std::size_t>(std::countr_zero(bits))]];
+      const std::uint32_t leaf = scratch.leaf[i + static_cast<std::size_t>(std::countr_zero(bits))];
       ++scratch.leaves_tested;
       if (!TestLeaf(scene, leaf, receiver, receivers, planes, scratch.counters)) continue;
       if (receivers.open[index] == 0) return;

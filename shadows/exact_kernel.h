@@ -21,6 +21,7 @@ struct SampleRectangles {
 
 struct ExactScene {
   const BlockerTree* tree = nullptr;
+  const BlockerFit* fit = nullptr;  // of the tree, to the samples
   const KernelSamples* samples = nullptr;
   const SampleRectangles* rectangles = nullptr;
   const SampleRows* rows = nullptr;  // where the samples have rows

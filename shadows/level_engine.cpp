@@ -62,11 +62,11 @@ float reach_of(const LightBound& bound) {
 bool is_turned(const LightFrame& from, const LightFrame& to) { return std::fabs(glm::dot(from.u, to.u)) < 0.5; }
 
 /// Boxes in one frame from those in another that is turned by a right angle around the light's normal, either way.
-void turn_boxes(const LightFrame& from, const LightFrame& to, BlockerTree& tree) {
+void turn_boxes(const LightFrame& from, const LightFrame& to, BlockerFit& fit) {
   const double sign[2] = {glm::dot(to.u, from.v) < 0.0 ? -1.0 : 1.0, glm::dot(to.v, from.u) < 0.0 ? -1.0 : 1.0};
   const double off = std::max(glm::length(to.u - sign[0] * from.v), glm::length(to.v - sign[1] * from.u));
   const float pad = static_cast<float>(kFarthest * off) + 0x1p-21f;  // the latter for rounding
-  for (BlockerTree::Node& node : tree.nodes) {
+  for (BlockerTree::Node& node : fit.nodes) {
     for (std::uint32_t i = 0; i < BlockerTree::kWidth; ++i) {
       const float low[2] = {node.low[1][i], node.low[0][i]}, high[2] = {node.high[1][i], node.high[0][i]};
       for (int k = 0; k < 2; ++k) {
@@ -159,7 +159,7 @@ LevelEngine::LevelEngine(const LatticeMesh& mesh, const ReceiverArray& receivers
   if (!flat_ || mesh.triangles.empty()) return;
   if (rows_) corners_ = region_corners(light, first, mesh.frame);
   Stopwatch watch;
-  build_blocker_tree(mesh, first.one_sided ? kept_.sides[0].tree : tree_);
+  build_blocker_tree(mesh, tree_);
   if (config.back_face_casters) closed_ = find_closed_components(mesh);
   stats.build_ms += watch.lap();
 }
@@ -177,7 +177,7 @@ void LevelEngine::prepare(const LightSamples& samples) {
   kept_.samples.reach = std::max(kept_.samples.reach, reach_of(kept_.bound));
   if (first || !is_turned(before, kept_.front)) return;
   for (ExactSide& side : kept_.sides) {
-    if (side.fitted) turn_boxes(before, kept_.front, side.tree);
+    if (side.fitted) turn_boxes(before, kept_.front, side.fit);
   }
 }
 
@@ -192,8 +192,7 @@ void LevelEngine::give_up_withdrawn_certificates() {
 void LevelEngine::solve(const LightSamples& samples, const ReceiverArray& part) {
   const std::uint64_t certified = stats_.certified_blockers;
   if (flat_) {
-    const ExactBlockers blockers{mesh_, config_.back_face_casters ? &closed_ : nullptr,
-                                 samples.one_sided ? nullptr : &tree_};
+    const ExactBlockers blockers{mesh_, config_.back_face_casters ? &closed_ : nullptr, &tree_};
     solve_exact(blockers, part, light_, samples, config_, kept_, work_, masks_, stats_);
     give_up_withdrawn_certificates();
   } else {
@@ -249,14 +248,13 @@ const ExactSide* LevelEngine::side_of(std::span<const std::uint32_t> which, Ligh
   frame = kept_.front;
   if (high < 0.0) frame.n = -frame.n;
   const ExactSide& side = kept_.sides[low > 0.0 ? 0 : 1];
-  return side.fitted && !side.tree.leaves.empty() ? &side : nullptr;
+  return side.fitted && !tree_.leaves.empty() ? &side : nullptr;
 }
 
 bool LevelEngine::all_lit(std::span<const std::uint32_t> which) const {
   LightFrame frame;
   const ExactSide* side = side_of(which, frame);
   if (side == nullptr) return false;
-  const BlockerTree& tree = side->tree;
   Box box, box_in_frame, light_in_frame;
   for (const std::uint32_t i : which) {
     box.add(receivers_.position[i]);
@@ -271,7 +269,7 @@ bool LevelEngine::all_lit(std::span<const std::uint32_t> which) const {
   }
   std::vector<std::uint32_t> stack = {0};
   while (!stack.empty()) {
-    const BlockerTree::Node& node = tree.nodes[stack.back()];
+    const BlockerTree::Node& node = side->fit.nodes[stack.back()];
     stack.pop_back();
     for (std::uint32_t i = 0; i < node.count; ++i) {
       const Box child{{node.low[0][i], node.low[1][i], node.low[2][i]},
@@ -281,7 +279,7 @@ bool LevelEngine::all_lit(std::span<const std::uint32_t> which) const {
         stack.push_back(node.child[i]);
         continue;
       }
-      const BlockerTree::Leaf& leaf = tree.leaves[node.child[i] & ~BlockerTree::kLeafBit];
+      const BlockerTree::Leaf& leaf = tree_.leaves[node.child[i] & ~BlockerTree::kLeafBit];
       for (std::uint32_t lane = 0; lane < leaf.count; ++lane) {
         if (!hides_nothing(mesh_, leaf.triangle[lane], from, corners_)) return false;
       }
@@ -294,14 +292,13 @@ bool LevelEngine::all_dark(std::span<const std::uint32_t> which) const {
   LightFrame frame;
   const ExactSide* side = side_of(which, frame);
   if (side == nullptr) return false;
-  const BlockerTree& tree = side->tree;
   Box box;
   for (const std::uint32_t i : which) box.add(receivers_.position[i]);
   const dvec3 from = frame.to_frame((dvec3(box.low) + dvec3(box.high)) * 0.5);
   const dvec3 to = frame.to_frame((dvec3(corners_[0]) + dvec3(corners_[3])) * 0.5);
   std::vector<std::uint32_t> stack = {0};
   while (!stack.empty()) {
-    const BlockerTree::Node& node = tree.nodes[stack.back()];
+    const BlockerTree::Node& node = side->fit.nodes[stack.back()];
     stack.pop_back();
     for (std::uint32_t i = 0; i < node.count; ++i) {
       if (!segment_meets(from, to, node, i)) continue;
@@ -309,7 +306,7 @@ bool LevelEngine::all_dark(std::span<const std::uint32_t> which) const {
         stack.push_back(node.child[i]);
         continue;
       }
-      const BlockerTree::Leaf& leaf = tree.leaves[node.child[i] & ~BlockerTree::kLeafBit];
+      const BlockerTree::Leaf& leaf = tree_.leaves[node.child[i] & ~BlockerTree::kLeafBit];
       for (std::uint32_t lane = 0; lane < leaf.count; ++lane) {
         const std::uint32_t triangle = leaf.triangle[lane];
         if ((leaf.perforated >> lane) & 1 || !hides_all(mesh_, triangle, box, corners_)) continue;

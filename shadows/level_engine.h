@@ -38,7 +38,7 @@ class LevelEngine {
   ShadowStats& stats_;
   bool rows_;
   bool flat_;
-  BlockerTree tree_;  // for lights with two sides; else it is that of the only side
+  BlockerTree tree_;
   ClosedComponents closed_;
   ExactLight kept_;
   ExactWork work_;

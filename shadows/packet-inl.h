@@ -154,7 +154,7 @@ struct LeafView {
 
 /// Triangles that hide samples below them from receivers in a box: not those of closed components that none lies
 /// within, whose back faces suffice.
-HWY_INLINE std::uint32_t SamplesBelow(const BlockerTree::Leaf& leaf, const vec3& low, const vec3& high) {
+HWY_INLINE std::uint32_t SamplesBelow(const BlockerFit::Leaf& leaf, const vec3& low, const vec3& high) {
   const bool outside_box = low.x > leaf.box_high.x || low.y > leaf.box_high.y || low.z > leaf.box_high.z ||
                            high.x < leaf.box_low.x || high.y < leaf.box_low.y || high.z < leaf.box_low.z;
   return leaf.samples_below & ~(outside_box ? leaf.back_faces_only : 0u);
@@ -163,8 +163,8 @@ HWY_INLINE std::uint32_t SamplesBelow(const BlockerTree::Leaf& leaf, const vec3&
 /// On which side of the planes a box of receivers lies, and so whether they separate it from samples. Fills above,
 /// below and active.
 template <class View>
-HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const vec3& low, const vec3& high,
-                          const vec3& half, const Vec3& to_corner, View& view) {
+HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, const BlockerFit::Leaf& fit, std::size_t i, const vec3& low,
+                          const vec3& high, const vec3& half, const Vec3& to_corner, View& view) {
   const Tag d;
   const Vec3 normal{hn::LoadU(d, leaf.normal[0] + i), hn::LoadU(d, leaf.normal[1] + i),
                     hn::LoadU(d, leaf.normal[2] + i)};
@@ -175,7 +175,7 @@ HWY_INLINE void FindSides(const BlockerTree::Leaf& leaf, std::size_t i, const ve
   const auto above = static_cast<std::uint32_t>(Bits(hn::Gt(side, error))),
              below = static_cast<std::uint32_t>(Bits(hn::Lt(side, hn::Neg(error))));
   const std::uint32_t in_leaf = (1u << std::min<std::size_t>(leaf.count - i, hn::Lanes(d))) - 1;
-  const std::uint32_t samples_above = leaf.samples_above >> i, samples_below = SamplesBelow(leaf, low, high) >> i;
+  const std::uint32_t samples_above = fit.samples_above >> i, samples_below = SamplesBelow(fit, low, high) >> i;
   view.above |= above << i, view.below |= below << i;
   view.active |= (((samples_above & ~below) | (samples_below & ~above)) & in_leaf) << i;
 }
@@ -234,9 +234,10 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
 }
 
 /// Triangles from `i` on.
-HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& leaf, std::size_t i,
-                              const Packet& packet, LeafView& view) {
+HWY_INLINE void ViewTriangles(const ExactScene& scene, std::size_t index, std::size_t i, const Packet& packet,
+                              LeafView& view) {
   const Tag d;
+  const BlockerTree::Leaf& leaf = scene.tree->leaves[index];
   const vec3 middle = 0.5f * (packet.low + packet.high);
   const vec3 half = glm::max(packet.high - middle, middle - packet.low) * (1.0f + 0x1p-20f);
   std::array<Vec3, 3> to_corner;
@@ -245,7 +246,7 @@ HWY_INLINE void ViewTriangles(const ExactScene& scene, const BlockerTree::Leaf& 
         {hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i), hn::LoadU(d, leaf.corner[k][2] + i)},
         Splat(middle));
   }
-  FindSides(leaf, i, packet.low, packet.high, half, to_corner[0], view);
+  FindSides(leaf, scene.fit->leaves[index], i, packet.low, packet.high, half, to_corner[0], view);
   const std::uint64_t active = (view.active >> i) & ((std::uint64_t{1} << hn::Lanes(d)) - 1);
   if (active == 0) return;
   LaneRectangles q;

@@ -42,7 +42,7 @@ class PacketSolver {
       for (std::uint64_t bits = BoxesOverOpenSamples(rows_, low, high, i, packet_, 0, ranges); bits != 0;
            bits &= bits - 1) {
         const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
-        if (!RasterizeGroup(scene_.tree->nodes[scratch_.leaf[at]], scratch_.groups[at])) continue;
+        if (!RasterizeGroup(scene_.fit->nodes[scratch_.leaf[at]], scratch_.groups[at])) continue;
         any = true;
         if (!FindOpenPart()) {
           StoreMasks();
@@ -63,8 +63,8 @@ class PacketSolver {
   void SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves, std::uint32_t line,
                    const std::uint32_t* doubtful, std::uint32_t* blocked);
   const LeafView& ViewLeaf(const BlockerTree::Node& group, std::uint32_t k);
-  bool RasterizeLeaf(const BlockerTree::Leaf& leaf, const LeafView& view, std::uint32_t wanted);
-  bool RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafView& view, std::size_t lane);
+  bool RasterizeLeaf(std::size_t leaf, const LeafView& view, std::uint32_t wanted);
+  bool RasterizeTriangle(std::size_t leaf, const LeafView& view, std::size_t lane);
   void StoreMasks();
 
   HWY_INLINE void SetPlanes(PacketTriangle& triangle) const;
@@ -178,8 +178,8 @@ bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& vie
     std::uint32_t wanted = view.patch[k] | view.turns[k] | view.single[k];
     if (patched) wanted &= ~patch[k];
     if (wanted == 0) continue;
-    const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
-    counters_.pairs_tested += leaf.count * packet_.count;
+    const std::uint32_t leaf = group.first_leaf() + k;
+    counters_.pairs_tested += scene_.tree->leaves[leaf].count * packet_.count;
     added |= RasterizeLeaf(leaf, ViewLeaf(group, k), wanted);
   }
   return added;
@@ -199,7 +199,8 @@ void PacketSolver::FindTurns(const BlockerTree::Node& group, GroupView& view, st
     if (view.turns[k] == 0) continue;
     const bool is_listed = (leaves >> k & 1) != 0;
     const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
-    const std::uint32_t samples_below = SamplesBelow(leaf, cluster_.low, cluster_.high);
+    const BlockerFit::Leaf& fit = scene_.fit->leaves[group.first_leaf() + k];
+    const std::uint32_t samples_below = SamplesBelow(fit, cluster_.low, cluster_.high);
     for (std::uint32_t rest = view.turns[k]; rest != 0; rest &= rest - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
       const std::size_t at = BlockerTree::kWidth * k + lane;
@@ -212,7 +213,7 @@ void PacketSolver::FindTurns(const BlockerTree::Node& group, GroupView& view, st
       if (!hn::AllFalse(d, hn::And(everyone, hn::Le(hn::Abs(side), error)))) continue;
       patch[k] |= static_cast<std::uint16_t>(1u << lane);
       const auto above = static_cast<std::uint16_t>(Bits(hn::Gt(side, hn::Zero(d))));
-      if (leaf.samples_above >> lane & 1) positive[at] = above;
+      if (fit.samples_above >> lane & 1) positive[at] = above;
       if (samples_below >> lane & 1) negative[at] = static_cast<std::uint16_t>(~above);
     }
   }
@@ -223,14 +224,15 @@ const LeafView& PacketSolver::ViewLeaf(const BlockerTree::Node& group, std::uint
   LeafView& view = views_[k];
   if ((viewed_ >> k & 1) != 0) return view;
   viewed_ |= 1u << k;
-  const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
+  const std::uint32_t leaf = group.first_leaf() + k, count = scene_.tree->leaves[leaf].count;
   view.above = view.below = view.bounded = view.active = view.kept = 0;
-  for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(Tag())) ViewTriangles(scene_, leaf, i, packet_, view);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(Tag())) ViewTriangles(scene_, leaf, i, packet_, view);
   return view;
 }
 
 /// The triangles of `wanted`, one by one; true where samples were blocked.
-bool PacketSolver::RasterizeLeaf(const BlockerTree::Leaf& leaf, const LeafView& view, std::uint32_t wanted) {
+bool PacketSolver::RasterizeLeaf(std::size_t index, const LeafView& view, std::uint32_t wanted) {
+  const BlockerTree::Leaf& leaf = scene_.tree->leaves[index];
   const std::uint32_t kept = view.kept & wanted;
   if (kept == 0) return false;
   std::uint64_t vertices = 0;
@@ -245,7 +247,7 @@ bool PacketSolver::RasterizeLeaf(const BlockerTree::Leaf& leaf, const LeafView& 
   }
   bool added = false;
   for (std::uint32_t rest = kept; rest != 0; rest &= rest - 1)
-    added |= RasterizeTriangle(leaf, view, static_cast<std::size_t>(std::countr_zero(rest)));
+    added |= RasterizeTriangle(index, view, static_cast<std::size_t>(std::countr_zero(rest)));
   return added;
 }
 
@@ -340,9 +342,9 @@ HWY_INLINE void PacketSolver::SetPlanes(PacketTriangle& triangle) const {
   const BlockerPlane& plane = triangle.plane;
   const SampleSides sides = sides_of_samples(plane, triangle.corner[0], *scene_.samples);
   const float error = sides.plane_error + plane.side_error * (rows_.deviation / kDeterminantError);
-  triangle.planes[3] = SolveForX(rows_, hn::Set(d, glm::dot(plane.normal, rows_.axis_x)),
-                                 hn::Set(d, glm::dot(plane.normal, rows_.axis_y)),
-                                 hn::Set(d, sides.plane_at_center), hn::Set(d, error));
+  triangle.planes[3] =
+      SolveForX(rows_, hn::Set(d, glm::dot(plane.normal, rows_.axis_x)),
+                hn::Set(d, glm::dot(plane.normal, rows_.axis_y)), hn::Set(d, sides.plane_at_center), hn::Set(d, error));
   triangle.count = 4;
 }
 
@@ -445,9 +447,11 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Li
 }
 
 /// One triangle into all pictures; true where samples were blocked.
-bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafView& view, std::size_t lane) {
+bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, std::size_t lane) {
   const Tag d;
   const UintTag du;
+  const BlockerTree::Leaf& leaf = scene_.tree->leaves[index];
+  const BlockerFit::Leaf& fit = scene_.fit->leaves[index];
   const PictureRange range(rows_, view.ranges, lane);
   LaneMask active =
       hn::And(hn::FirstN(d, packet_.count), hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
@@ -464,11 +468,11 @@ bool PacketSolver::RasterizeTriangle(const BlockerTree::Leaf& leaf, const LeafVi
   }
   if (hn::AllFalse(d, active)) return false;
   PacketTriangle triangle;
-  triangle.alpha = (leaf.perforated >> lane & 1) != 0 ? &scene_.tree->alpha_of(leaf, lane) : nullptr;
+  triangle.alpha = (leaf.perforated >> lane & 1) != 0 ? &scene_.fit->alpha_of(*scene_.tree, index, lane) : nullptr;
   if (triangle.alpha != nullptr) std::fill(std::begin(texels_), std::end(texels_), std::nullopt);
   for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = Corner(leaf, k, lane);
   triangle.plane = {{leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}, leaf.side_error[lane]};
-  triangle.samples_above = leaf.samples_above >> lane & 1, triangle.samples_below = leaf.samples_below >> lane & 1;
+  triangle.samples_above = fit.samples_above >> lane & 1, triangle.samples_below = fit.samples_below >> lane & 1;
   SetPlanes(triangle);
   const bool above = (view.above >> lane) & 1, below = (view.below >> lane) & 1;
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));

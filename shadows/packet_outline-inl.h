@@ -38,9 +38,9 @@ struct LeafSides {
   std::uint32_t plain = 0;                         // projects onto the light's plane, and well
 };
 
-HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, const BlockerTree::Leaf& leaf, const ReceiverBox& box,
-                                LeafSides& sides) {
+HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, std::size_t index, const ReceiverBox& box, LeafSides& sides) {
   const Tag d;
+  const BlockerTree::Leaf& leaf = scene.tree->leaves[index];
   const vec3 middle = 0.5f * (box.low + box.high);
   const vec3 half = glm::max(box.high - middle, middle - box.low) * (1.0f + 0x1p-20f);
   const auto middle_z = static_cast<float>(scene.frame.to_frame(dvec3(middle)).z);
@@ -54,7 +54,7 @@ HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, const BlockerTree::Leaf
                                hn::LoadU(d, leaf.corner[k][2] + i)},
                               Splat(middle));
     }
-    FindSides(leaf, i, box.low, box.high, half, to_corner[0], sides);
+    FindSides(leaf, scene.fit->leaves[index], i, box.low, box.high, half, to_corner[0], sides);
     Vec least = hn::Set(d, 1e30f), lowest = least, farthest = hn::Zero(d);
     for (const Vec3& c : to_corner) {
       const Vec up = Dot(c, normal);
@@ -90,7 +90,7 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
   for (std::uint32_t k = 0; k < group.count; ++k) {
     const BlockerTree::Leaf& leaf = tree.leaves[first_leaf + k];
     LeafSides sides;
-    FindSidesOfLeaf(scene, leaf, box, sides);
+    FindSidesOfLeaf(scene, first_leaf + k, box, sides);
     std::uint32_t plain = sides.active & sides.plain & ~leaf.perforated;
     for (auto own = own_begin; own != own_end; ++own) {
       if (*own / BlockerTree::kWidth == first_leaf + k) plain &= ~(1u << *own % BlockerTree::kWidth);

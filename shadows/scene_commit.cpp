@@ -197,7 +197,6 @@ void update_tree(SceneImpl& scene) {
   } else if (!scene.tree_is_placed) {
     place_blockers(scene.mesh, scene.tree);
   }
-  if (!scene.tree_is_placed) ++scene.tree_version;
   scene.tree_is_placed = true;
   scene.stats.tree_ms = watch.lap();
 }

@@ -57,8 +57,7 @@ struct ShadowScene::Impl {
 
   /// Nobody else has this pointer's address as long as anybody keeps it: tells scenes apart.
   std::shared_ptr<const int> identity = std::make_shared<const int>(0);
-  std::uint64_t version = 0;       // of what blocks
-  std::uint64_t tree_version = 0;  // of the tree
+  std::uint64_t version = 0;  // of what blocks
 
   const StoredMesh* find(std::uint32_t id) const;
   StoredMesh& get(std::uint32_t id);  // throws Error{kUsage}

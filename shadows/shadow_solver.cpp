@@ -176,15 +176,13 @@ void solve_exact_kept(const Call& call, const Light& light, KeptLight& kept, Sha
   Stopwatch watch;
   if (!kept.prepared) prepare_exact_light(light, kept.samples, kept.exact);
   kept.prepared = true;
-  if (kept.scene != scene.identity) kept.exact.forget_blockers();
-  if (kept.scene_version != scene.version) kept.exact.unfit();
+  if (kept.scene != scene.identity || kept.scene_version != scene.version) kept.exact.unfit();
   kept.scene = scene.identity, kept.scene_version = scene.version;
   stats.build_ms = watch.lap();
   const std::size_t words = (kept.samples.count + 63) / 64;
   w.exact.reserve(w.receivers.size(), words);
   w.masks.words.reserve(w.receivers.size() * words);
-  const ExactBlockers blockers{scene.mesh, scene.config.back_face_casters ? &scene.closed : nullptr, &scene.tree,
-                               scene.tree_version};
+  const ExactBlockers blockers{scene.mesh, scene.config.back_face_casters ? &scene.closed : nullptr, &scene.tree};
   solve_exact(blockers, w.lit.array, light, kept.samples, call.config, kept.exact, w.exact, w.masks, stats);
 }
 

@@ -26,7 +26,8 @@ struct TransmittancePass {
   KernelSamples kernel;
   std::vector<std::uint32_t> position;  // [set][sample] -> place in the kernel's order
   BlockerTree tree;                     // over panes.mesh
-  Box light;                            // around all samples
+  BlockerFit fit;
+  Box light;  // around all samples
 
   TransmittancePass(const Panes& p, const ReceiverArray& r, const LightSamples& s, const VisibilityMasks& m,
                     std::span<const vec3> w)
@@ -47,7 +48,7 @@ void prepare(const Light& light, TransmittancePass& pass) {
   }
   for (const vec3& p : samples.points) pass.light.add(p);
   build_blocker_tree(pass.panes.mesh, pass.tree);
-  refit_blocker_tree(pass.panes.mesh, pass.kernel, LightFrame(), pass.tree);
+  fit_blocker_tree(pass.panes.mesh, pass.tree, pass.kernel, LightFrame(), pass.fit);
 }
 
 void make_room(const TransmittancePass& pass, std::size_t size, TransmittanceTile& tile) {
@@ -96,11 +97,11 @@ Box fill_tile(const TransmittancePass& pass, std::span<const std::uint32_t> memb
 }
 
 /// Leaves of the tree that meet the hull of tile and light.
-void find_leaves(const BlockerTree& tree, const Shaft& shaft, TransmittanceTile& tile) {
+void find_leaves(const BlockerFit& fit, const Shaft& shaft, TransmittanceTile& tile) {
   tile.leaves.clear();
   tile.stack.assign(1, 0);
   while (!tile.stack.empty()) {
-    const BlockerTree::Node& node = tree.nodes[tile.stack.back()];
+    const BlockerTree::Node& node = fit.nodes[tile.stack.back()];
     tile.stack.pop_back();
     for (std::uint32_t i = 0; i < node.count; ++i) {
       const Box box{{node.low[0][i], node.low[1][i], node.low[2][i]},
@@ -140,8 +141,8 @@ void solve_tile(const TransmittancePass& pass, std::span<const std::uint32_t> me
                 std::vector<vec3>& reaching) {
   const Box box = fill_tile(pass, members, tile);
   if (!box.is_empty()) {
-    find_leaves(pass.tree, Shaft(box, pass.light), tile);
-    cross_panes(pass.panes, pass.tree, tile.leaves, pass.kernel, tile);
+    find_leaves(pass.fit, Shaft(box, pass.light), tile);
+    cross_panes(pass.panes, pass.tree, pass.fit, tile.leaves, pass.kernel, tile);
   }
   for (std::size_t i = 0; i < members.size(); ++i) {
     reaching[members[i]] = tile.receivers.open[i] != 0 ? resolve(pass, members[i], i, tile) : vec3(0.0f);
@@ -201,7 +202,7 @@ void solve_transmittance(const Panes& panes, const ReceiverArray& receivers, con
   reaching.assign(receivers.size(), vec3(0.0f));
   TransmittancePass pass(panes, receivers, samples, masks, weights);
   prepare(light, pass);
-  if (panes.empty()) pass.tree.nodes.emplace_back();  // a root without children
+  if (panes.empty()) pass.fit.nodes.emplace_back();  // a root without children
   const std::size_t size = std::clamp<std::size_t>(kMostTileWords / (3 * pass.kernel.padded), 1, tile);
   const std::vector<std::uint32_t> order = morton_order(receivers.position, [](std::uint32_t) { return true; });
   const std::size_t per_task = size * kTilesPerTask, tasks = (order.size() + per_task - 1) / per_task;

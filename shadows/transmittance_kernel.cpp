@@ -56,12 +56,11 @@ void CrossPane(const Panes& panes, const Blocker& blocker, const KernelSamples& 
   }
 }
 
-void CrossPanes(const Panes& panes, const BlockerTree& tree, std::span<const std::uint32_t> leaves,
-                const KernelSamples& samples, TransmittanceTile& tile) {
+void CrossPanes(const Panes& panes, const BlockerTree& tree, const BlockerFit& fit,
+                std::span<const std::uint32_t> leaves, const KernelSamples& samples, TransmittanceTile& tile) {
   for (const std::uint32_t l : leaves) {
-    const BlockerTree::Leaf& leaf = tree.leaves[l];
-    for (std::uint32_t i = 0; i < leaf.count; ++i) {
-      Blocker pane = blocker_at(tree, leaf, i, samples);
+    for (std::uint32_t i = 0; i < tree.leaves[l].count; ++i) {
+      Blocker pane = blocker_at(tree, fit, l, i, samples);
       pane.perforated = true;  // not the shortcut that marks a receiver as hidden: each of its samples is to be settled
       CrossPane(panes, pane, samples, tile);
     }
@@ -145,9 +144,9 @@ void filter_uniformly(const RgbAttenuation& filter, const KernelSamples& samples
 
 HWY_EXPORT(CrossPanes);
 
-void cross_panes(const Panes& panes, const BlockerTree& tree, std::span<const std::uint32_t> leaves,
-                 const KernelSamples& samples, TransmittanceTile& tile) {
-  HWY_DYNAMIC_DISPATCH(CrossPanes)(panes, tree, leaves, samples, tile);
+void cross_panes(const Panes& panes, const BlockerTree& tree, const BlockerFit& fit,
+                 std::span<const std::uint32_t> leaves, const KernelSamples& samples, TransmittanceTile& tile) {
+  HWY_DYNAMIC_DISPATCH(CrossPanes)(panes, tree, fit, leaves, samples, tile);
 }
 
 void filter_samples(const Panes& panes, std::uint32_t pane, const KernelSamples& samples, std::size_t receiver,

@@ -25,8 +25,8 @@ struct TransmittanceTile {
 
 /// Multiplies the light of the tile's receivers by the panes in the given leaves of `tree`, which is built over
 /// panes.mesh.
-void cross_panes(const Panes& panes, const BlockerTree& tree, std::span<const std::uint32_t> leaves,
-                 const KernelSamples& samples, TransmittanceTile& tile);
+void cross_panes(const Panes& panes, const BlockerTree& tree, const BlockerFit& fit,
+                 std::span<const std::uint32_t> leaves, const KernelSamples& samples, TransmittanceTile& tile);
 
 /// Adds one pane's attenuation to the samples of a receiver whose bits are set in `crossed` (kernel's order), all of
 /// which are open.

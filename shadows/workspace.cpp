@@ -9,7 +9,7 @@ std::uint64_t bytes_of(const std::vector<T>& values) {
 }
 
 std::uint64_t bytes_of(const KeptLight& kept) {
-  return kept.exact.sides[0].tree.bytes() + kept.exact.sides[1].tree.bytes() + bytes_of(kept.samples.points) +
+  return kept.exact.sides[0].fit.bytes() + kept.exact.sides[1].fit.bytes() + bytes_of(kept.samples.points) +
          bytes_of(kept.samples.st) + bytes_of(kept.image.rgb) + bytes_of(kept.weights);
 }
 

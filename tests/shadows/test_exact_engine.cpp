@@ -39,14 +39,15 @@ TEST_CASE("the blocker tree holds every triangle once, in full leaves, inside th
     const LightFrame frame{dvec3(bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
     BlockerTree tree;
     build_blocker_tree(mesh, tree);
-    refit_blocker_tree(mesh, make_kernel_samples(samples, bound), frame, tree);
+    BlockerFit fit;
+    fit_blocker_tree(mesh, tree, make_kernel_samples(samples, bound), frame, fit);
     std::vector<std::uint32_t> order = tree.order;
     std::sort(order.begin(), order.end());
     REQUIRE(order.size() == static_cast<std::size_t>(count));
     for (std::uint32_t t = 0; t < order.size(); ++t) REQUIRE(order[t] == t);
     CHECK(tree.leaves.size() <= static_cast<std::size_t>(count) / 6 + 1);
     std::size_t reached = 0;
-    for (const BlockerTree::Node& node : tree.nodes) {
+    for (const BlockerTree::Node& node : fit.nodes) {
       for (std::uint32_t i = 0; i < node.count; ++i) {
         if ((node.child[i] & BlockerTree::kLeafBit) == 0) continue;
         const BlockerTree::Leaf& leaf = tree.leaves[node.child[i] & ~BlockerTree::kLeafBit];
