@@ -123,6 +123,11 @@ void read_receivers(const ShadowScene::Impl& scene, const ReceiverView& view, Ca
 }
 
 void read_receivers(const ShadowScene::Impl& scene, const GBuffer& gbuffer, CallReceivers& receivers) {
+  if (gbuffer.drawn != DrawnState() && gbuffer.drawn != scene.state()) {
+    throw Error(ErrorCode::kUsage, gbuffer.drawn.scene == scene.identity
+                                       ? "receivers: the G-buffer is older than a commit that changed meshes or frame"
+                                       : "receivers: the G-buffer shows another scene");
+  }
   if (gbuffer.position.size() != gbuffer.size() || gbuffer.geometric_normal.size() != gbuffer.size() ||
       std::size_t{gbuffer.window.width()} * gbuffer.window.height() != gbuffer.size()) {
     throw Error(ErrorCode::kBadInput, "receivers: the G-buffer's arrays do not have the size of its window");

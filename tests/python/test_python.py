@@ -179,6 +179,14 @@ class Values(unittest.TestCase):
         )
         np.testing.assert_array_equal(single, result.visibility[0][shown])
         self.assertLess(single.min(), single.max())
+        # A moved light needs no new picture, a moved mesh does.
+        self.solver.visibility(self.scene, gbuffer, hs.Light.point((1, 4, 0)))
+        self.scene.set_transform(0, [[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0]])
+        self.scene.commit()
+        with self.assertRaisesRegex(hs.UsageError, "older than a commit"):
+            self.solver.visibility(self.scene, gbuffer, square())
+        with self.assertRaisesRegex(hs.UsageError, "another scene"):
+            self.solver.visibility(half_plane_scene(), gbuffer, square())
         self.assertEqual(self.scene.to_world((0, 0, 0)).shape, (3,))
         for wrong in (1.0, [(1, 2)], "points"):
             with self.assertRaisesRegex(hs.UsageError, "points"):
