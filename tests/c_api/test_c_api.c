@@ -441,6 +441,19 @@ static void wrong_sizes_are_refused(void) {
   lights[1].later[1] = 1;
   CHECK_FAILS(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, &lights[0].known, 2, &f.output),
               HALFSHADE_ERROR_USAGE, "later version");
+  /* Elements that would lie at odd addresses; one that says it is larger than its place. */
+  lights[0].known.struct_size = sizeof(halfshade_light) + 1;
+  CHECK_FAILS(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, &lights[0].known, 2, &f.output),
+              HALFSHADE_ERROR_USAGE, "struct_size");
+  lights[0].known.struct_size = sizeof lights[0];
+  lights[1].known.struct_size = sizeof lights[0] + 4000;
+  CHECK_FAILS(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, &lights[0].known, 2, &f.output),
+              HALFSHADE_ERROR_USAGE, "differ in struct_size");
+  /* No lights, no receivers: nothing to do, with whatever arrays. */
+  f.output.visibility_count = 0;
+  CHECK_OK(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, NULL, 0, &f.output));
+  f.receivers.positions.count = 0;
+  CHECK_OK(solve(&f));
   tear_down(&f);
 }
 

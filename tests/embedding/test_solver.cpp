@@ -299,9 +299,20 @@ TEST_CASE("a G-buffer is refused unless it shows the scene as it is") {
   CHECK(visibility == expected);
   const auto shown =
       std::find_if(by_hand.triangle.begin(), by_hand.triangle.end(), [](std::uint32_t t) { return t != kNone; });
+  const std::size_t at = static_cast<std::size_t>(shown - by_hand.triangle.begin());
+  const std::string receiver = "receiver " + std::to_string(at) + ": ";
+  for (const double wrong : {2.0, -1e300, std::nan(""), HUGE_VAL}) {
+    GBuffer spoilt = by_hand;
+    spoilt.position[at].y = wrong;
+    CHECK(solve_in(twin.scene, spoilt) == receiver + "the G-buffer's position is not in the local frame, -1..1");
+    spoilt = by_hand;
+    spoilt.reach = wrong;
+    CHECK(solve_in(twin.scene, spoilt) == "receivers: the G-buffer's reach is not in 0..1");
+  }
+  by_hand.geometric_normal[at].z = std::nanf("");
+  CHECK(solve_in(twin.scene, by_hand) == receiver + "the G-buffer's normal is not finite");
   *shown = 1000000;
-  CHECK(solve_in(twin.scene, by_hand) == "receiver " + std::to_string(shown - by_hand.triangle.begin()) +
-                                             ": the G-buffer belongs to another scene: there is no such triangle");
+  CHECK(solve_in(twin.scene, by_hand) == receiver + "the G-buffer belongs to another scene: there is no such triangle");
 }
 
 TEST_CASE("under a far sun, surfaces do not shadow themselves and what is close above them does") {

@@ -31,7 +31,7 @@ import tempfile
 KNOWN = {"cpp", "c", "sh", "sh small", "sh installed", "python", "text", "json", "cmake"}
 TEXT = {"docs/ARCHITECTURE.md": 1}  # a drawing
 HERE = pathlib.Path(__file__).resolve().parent
-SECONDS = 300  # for all blocks of a page together
+SECONDS = 900  # for all blocks of a page together; on a machine that has more to do they take many times what they work
 
 
 def blocks(page, language):
