@@ -67,7 +67,10 @@ void resize(GBuffer& gbuffer, const RasterConfig& config, const PixelWindow& win
   gbuffer.width = config.width;
   gbuffer.height = config.height;
   gbuffer.window = window;
+  gbuffer.drawn = {};
 }
+
+void clear(GBuffer& gbuffer) { resize(gbuffer, {.width = 0, .height = 0, .window = {}, .subpixel_offset = {}}, {}); }
 
 // ---- one tile -----------------------------------------------------------------------------------------------------
 
@@ -198,9 +201,14 @@ void rasterize(const LatticeMesh& mesh, const Camera& camera, const RasterConfig
   counted.triangles_clipped = pass.counts.clipped;
   counted.triangles_binned = pass.counts.survived;
   counted.tile_entries = pass.bins.entries.size();
-  resize(gbuffer, config, window);
-  gbuffer.reach = reach_of(mesh);
-  draw_tiles(mesh, frame, pass, gbuffer, counted);
+  try {
+    resize(gbuffer, config, window);
+    gbuffer.reach = reach_of(mesh);
+    draw_tiles(mesh, frame, pass, gbuffer, counted);
+  } catch (...) {
+    clear(gbuffer);  // half a picture of this and half of the one before would pass for one
+    throw;
+  }
   if (stats != nullptr) *stats = counted;
 }
 

@@ -69,7 +69,9 @@ void read_points(const halfshade_points& points, const std::string& name, std::v
 }  // namespace
 
 void check_struct_size(std::size_t struct_size, std::size_t known, const char* name) {
-  if (struct_size >= known && struct_size <= known + kMostUnknownBytes) return;
+  // The size of a struct is a multiple of its alignment: no other number can have been sizeof.
+  const bool possible = struct_size % alignof(std::size_t) == 0;
+  if (possible && struct_size >= known && struct_size <= known + kMostUnknownBytes) return;
   usage(std::string(name) + ".struct_size is " + std::to_string(struct_size) + ", expected sizeof, " +
         std::to_string(known));
 }
@@ -203,8 +205,9 @@ void to_lights(const halfshade_light* given, std::size_t count, std::vector<Ligh
   for (std::size_t i = 0; i < count; ++i) {
     const auto* one = reinterpret_cast<const halfshade_light*>(reinterpret_cast<const unsigned char*>(given) +
                                                                i * given->struct_size);
-    to_light(one, "lights[" + std::to_string(i) + "]", lights[i]);
+    // Before it is read: what it says may reach beyond the array.
     if (one->struct_size != given->struct_size) usage("lights differ in struct_size");
+    to_light(one, "lights[" + std::to_string(i) + "]", lights[i]);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <string_view>
 
 #include "rasterizer/core/parallel.h"
 #include "shadows/view_access.h"
@@ -86,6 +87,18 @@ vec3 unit(const dvec3& v) {
                 std::to_string(element(view.meshes, i)));
 }
 
+/// What is wrong with an entry that is no background; or nothing.
+std::string_view fault_of(const ShadowScene::Impl& scene, const GBuffer& gbuffer, std::size_t i) {
+  if (gbuffer.triangle[i] >= scene.mesh.triangles.size()) {
+    return "the G-buffer belongs to another scene: there is no such triangle";
+  }
+  if (gbuffer.drawn != DrawnState()) return {};  // the rest is ours
+  const dvec3 p = glm::abs(gbuffer.position[i]);
+  if (!(p.x <= 1.0 && p.y <= 1.0 && p.z <= 1.0)) return "the G-buffer's position is not in the local frame, -1..1";
+  if (!is_finite(dvec3(gbuffer.geometric_normal[i]))) return "the G-buffer's normal is not finite";
+  return {};
+}
+
 }  // namespace
 
 void CallReceivers::resize(std::size_t count) {
@@ -123,9 +136,17 @@ void read_receivers(const ShadowScene::Impl& scene, const ReceiverView& view, Ca
 }
 
 void read_receivers(const ShadowScene::Impl& scene, const GBuffer& gbuffer, CallReceivers& receivers) {
+  if (gbuffer.drawn != DrawnState() && gbuffer.drawn != scene.state()) {
+    throw Error(ErrorCode::kUsage, gbuffer.drawn.scene == scene.identity
+                                       ? "receivers: the G-buffer is older than a commit that changed meshes or frame"
+                                       : "receivers: the G-buffer shows another scene");
+  }
   if (gbuffer.position.size() != gbuffer.size() || gbuffer.geometric_normal.size() != gbuffer.size() ||
       std::size_t{gbuffer.window.width()} * gbuffer.window.height() != gbuffer.size()) {
     throw Error(ErrorCode::kBadInput, "receivers: the G-buffer's arrays do not have the size of its window");
+  }
+  if (!(gbuffer.reach > 0.0 && gbuffer.reach <= 1.0)) {
+    throw Error(ErrorCode::kBadInput, "receivers: the G-buffer's reach is not in 0..1");
   }
   receivers.resize(gbuffer.size());
   receivers.has_normals = true;
@@ -134,7 +155,10 @@ void read_receivers(const ShadowScene::Impl& scene, const GBuffer& gbuffer, Call
     for (std::size_t i = begin; i != end; ++i) {
       receivers.absent[i] = gbuffer.triangle[i] == kNone;
       if (receivers.absent[i]) continue;
-      if (gbuffer.triangle[i] >= scene.mesh.triangles.size()) first_wrong.note(i);
+      if (!fault_of(scene, gbuffer, i).empty()) {
+        first_wrong.note(i);
+        continue;
+      }
       const std::uint32_t x = gbuffer.window.x0 + static_cast<std::uint32_t>(i % gbuffer.window.width());
       const std::uint32_t y = gbuffer.window.y0 + static_cast<std::uint32_t>(i / gbuffer.window.width());
       receivers.normal[i] = gbuffer.geometric_normal[i];
@@ -144,8 +168,7 @@ void read_receivers(const ShadowScene::Impl& scene, const GBuffer& gbuffer, Call
       receivers.quad[i] = static_cast<std::uint8_t>(interleaved_set(x, y));
     }
   });
-  if (first_wrong.any())
-    refuse(first_wrong.index(), "the G-buffer belongs to another scene: there is no such triangle");
+  if (first_wrong.any()) refuse(first_wrong.index(), std::string(fault_of(scene, gbuffer, first_wrong.index())));
 }
 
 void select_lit(const CallReceivers& receivers, const LightSamples& samples, std::uint32_t seed, LitReceivers& lit) {

@@ -55,6 +55,7 @@ void place_mesh(const StoredMesh& mesh, std::uint32_t material, SceneImpl& scene
 }
 
 void lay_out(SceneImpl& scene) {
+  ++scene.surfaces;
   std::size_t vertices = 0, triangles = 0;
   bool textured = false;
   scene.attributes.materials.clear();
@@ -119,6 +120,7 @@ MeshCertificate make_certificate(const StoredMesh& mesh, std::span<const vec3> p
 
 /// Positions, and whether the mesh is still as closed as it was.
 void update_mesh(StoredMesh& mesh, SceneImpl& scene) {
+  ++scene.surfaces;
   scene.tree_is_placed = false;
   round_mesh(mesh, scene);
   ++scene.stats.meshes_rounded;

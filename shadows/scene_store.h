@@ -1,7 +1,7 @@
 // What a ShadowScene holds: meshes as they were given, and what commit() makes of them.
 #pragma once
 
-#include "halfshade/shadow_scene.h"
+#include "halfshade/rasterizer.h"
 #include "rasterizer/core/mesh.h"
 #include "shadows/blocker_tree.h"
 #include "shadows/closed_components.h"
@@ -57,8 +57,10 @@ struct ShadowScene::Impl {
 
   /// Nobody else has this pointer's address as long as anybody keeps it: tells scenes apart.
   std::shared_ptr<const int> identity = std::make_shared<const int>(0);
-  std::uint64_t version = 0;  // of what blocks
+  std::uint64_t version = 0;   // of what blocks
+  std::uint64_t surfaces = 0;  // version of `mesh`; changes before it does, so that a commit that throws counts
 
+  DrawnState state() const { return {identity, surfaces}; }
   const StoredMesh* find(std::uint32_t id) const;
   StoredMesh& get(std::uint32_t id);  // throws Error{kUsage}
   /// Number in the scene's arrays, or kNone: there is no such triangle.

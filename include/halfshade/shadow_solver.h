@@ -131,9 +131,11 @@ class HALFSHADE_API ShadowSolver {
     solve(scene, receivers, std::span(&light, 1), workspace, output, execution);
   }
 
-  /// Receivers are the entries of a G-buffer that rasterize() made of the same scene since its last commit, with their
-  /// geometric normals; sets of samples go by their place in the whole picture. Entries that show the background get
-  /// what receivers get that are blocked in every sample.
+  /// Receivers are the entries of a G-buffer that rasterize() made of the same scene, with their geometric normals;
+  /// sets of samples go by their place in the whole picture. Entries that show the background get what receivers get
+  /// that are blocked in every sample. Throws Error{kUsage} as well for a G-buffer of another scene or from before a
+  /// commit that added, removed or moved meshes, added alpha maps or moved the frame (GBuffer::drawn); Error{kBadInput}
+  /// for arrays of another size than its window, and values that cannot be this scene's in one filled by hand.
   void solve(const ShadowScene& scene, const GBuffer& gbuffer, std::span<const Light> lights, Workspace& workspace,
              const ShadowOutput& output, const Execution& execution = {}) const;
 

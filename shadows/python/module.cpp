@@ -404,8 +404,10 @@ Receivers to_receivers(const py::object& values, const py::object& normals, cons
                        std::optional<std::uint32_t> frame) {
   Receivers receivers;
   if (py::isinstance<PyGBuffer>(values)) {
-    if (!normals.is_none() || !meshes.is_none() || !triangles.is_none() || frame.has_value() || first != 0) {
-      throw Error(ErrorCode::kUsage, "normals, meshes, triangles, first and frame go with points, not with a G-buffer");
+    if (!normals.is_none() || !meshes.is_none() || !triangles.is_none() || lift.has_value() || frame.has_value() ||
+        first != 0) {
+      throw Error(ErrorCode::kUsage,
+                  "normals, meshes, triangles, lift, first and frame go with points, not with a G-buffer");
     }
     receivers.gbuffer = &values.cast<const PyGBuffer&>().value;
     receivers.shape = {receivers.gbuffer->height, receivers.gbuffer->width};

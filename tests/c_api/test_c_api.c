@@ -303,6 +303,24 @@ static void pictures(void) {
   f.output.visibility_count = 5;
   CHECK_FAILS(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output),
               HALFSHADE_ERROR_USAGE, "visibility");
+  /* A moved light needs no new picture, a moved mesh does. */
+  f.output.visibility_count = 16 * 32;
+  f.light.center[0] = 1;
+  CHECK_OK(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output));
+  const double moved[12] = {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0};
+  CHECK_OK(halfshade_scene_set_transform(f.context, f.scene, f.mesh, moved));
+  CHECK_OK(halfshade_scene_commit(f.context, f.scene));
+  picture[0] = -1;
+  CHECK_FAILS(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output),
+              HALFSHADE_ERROR_USAGE, "older than a commit");
+  CHECK(picture[0] == -1);
+  CHECK_OK(halfshade_rasterize(f.context, f.scene, &camera, gbuffer));
+  CHECK_OK(halfshade_solve_gbuffer(f.context, f.solver, f.scene, f.workspace, gbuffer, &f.light, 1, &f.output));
+  fixture other;
+  set_up(&other, NULL);
+  CHECK_FAILS(halfshade_solve_gbuffer(f.context, f.solver, other.scene, f.workspace, gbuffer, &f.light, 1, &f.output),
+              HALFSHADE_ERROR_USAGE, "another scene");
+  tear_down(&other);
   halfshade_gbuffer_destroy(&gbuffer);
   tear_down(&f);
 }
@@ -423,6 +441,19 @@ static void wrong_sizes_are_refused(void) {
   lights[1].later[1] = 1;
   CHECK_FAILS(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, &lights[0].known, 2, &f.output),
               HALFSHADE_ERROR_USAGE, "later version");
+  /* Elements that would lie at odd addresses; one that says it is larger than its place. */
+  lights[0].known.struct_size = sizeof(halfshade_light) + 1;
+  CHECK_FAILS(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, &lights[0].known, 2, &f.output),
+              HALFSHADE_ERROR_USAGE, "struct_size");
+  lights[0].known.struct_size = sizeof lights[0];
+  lights[1].known.struct_size = sizeof lights[0] + 4000;
+  CHECK_FAILS(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, &lights[0].known, 2, &f.output),
+              HALFSHADE_ERROR_USAGE, "differ in struct_size");
+  /* No lights, no receivers: nothing to do, with whatever arrays. */
+  f.output.visibility_count = 0;
+  CHECK_OK(halfshade_solve(f.context, f.solver, f.scene, f.workspace, &f.receivers, NULL, 0, &f.output));
+  f.receivers.positions.count = 0;
+  CHECK_OK(solve(&f));
   tear_down(&f);
 }
 

@@ -221,6 +221,100 @@ TEST_CASE("a G-buffer of the scene asks for the same receivers as the caller cou
   }
 }
 
+TEST_CASE("a G-buffer is refused unless it shows the scene as it is") {
+  EmbedScene s(6);
+  GBuffer gbuffer;
+  RasterConfig raster;
+  raster.width = 24, raster.height = 16;
+  const auto draw = [&](const ShadowScene& scene) { rasterize(scene, {.eye = {0, 3, 6}}, raster, gbuffer); };
+  draw(s.scene);
+  const ShadowSolver solver({.light_sample_count = 16});
+  Workspace workspace;
+  Light light = frame_light();
+  std::vector<float> visibility(gbuffer.size());
+  const std::string is_fine = "nothing was thrown";
+  const auto solve_in = [&](const ShadowScene& scene, const GBuffer& from) {
+    std::fill(visibility.begin(), visibility.end(), -1.0f);
+    const std::string message = message_of([&] {
+      solver.solve(scene, from, {&light, 1}, workspace, {.visibility = visibility});
+    });
+    CHECK((message == is_fine) == (*std::min_element(visibility.begin(), visibility.end()) >= 0.0f));
+    return message;
+  };
+  const std::string is_older = "receivers: the G-buffer is older than a commit that changed meshes or frame";
+  const std::string is_foreign = "receivers: the G-buffer shows another scene";
+
+  CHECK(solve_in(s.scene, gbuffer) == is_fine);
+  light.center.x += 0.5, light.u *= 0.5;
+  s.scene.extend(light);  // within reach: nothing moves
+  s.scene.commit();
+  CHECK(solve_in(s.scene, gbuffer) == is_fine);
+
+  const std::function<void()> changes[] = {
+      [&] {
+        s.scene.set_transform(s.ids[1], moved_by({0.6, 1.0, 0.2}));
+      },
+      [&] { s.scene.set_positions(s.ids[2], s.meshes[2].positions); },
+      [&] { s.scene.remove_mesh(s.ids[3]); },
+      [&] { s.scene.add_mesh(s.meshes[3].view()); },
+      [&] {
+        const dvec3 far(1e4, 0.0, 0.0);
+        s.scene.extend(PointView(&far.x, 1));
+      },
+  };
+  for (const auto& change : changes) {
+    change();
+    s.scene.commit();
+    CHECK(solve_in(s.scene, gbuffer) == is_older);
+    draw(s.scene);
+    CHECK(solve_in(s.scene, gbuffer) == is_fine);
+  }
+
+  // A commit that was stopped in the middle has changed something.
+  const GBuffer before = gbuffer;
+  s.scene.set_transform(s.ids[1], moved_by({0.5, 1.0, 0.2}));
+  s.scene.set_transform(s.ids[2], moved_by({-0.5, 1.0, 0.2}));
+  CHECK_THROWS_AS(s.scene.commit({.executor = Executor::kSerial, .progress = [](double d) { return d < 0.25; }}),
+                  Error);
+  s.scene.set_transform(s.ids[1], moved_by({0.6, 1.0, 0.2}));
+  s.scene.commit();
+  CHECK(solve_in(s.scene, before) == is_older);
+  draw(s.scene);
+
+  // Another scene with the same content; the same scene in another place.
+  EmbedScene twin(6);
+  CHECK(solve_in(twin.scene, gbuffer) == is_foreign);
+  CHECK(solve_in(ShadowScene(std::move(s.scene)), gbuffer) == is_fine);  // which ends the scene
+  CHECK(solve_in(twin.scene, gbuffer) == is_foreign);
+
+  // Who fills one by hand, or from a file, answers for it.
+  GBuffer by_hand = gbuffer;
+  by_hand.drawn = {};
+  draw(twin.scene);
+  by_hand.triangle = gbuffer.triangle, by_hand.position = gbuffer.position, by_hand.reach = gbuffer.reach;
+  by_hand.geometric_normal = gbuffer.geometric_normal;
+  CHECK(solve_in(twin.scene, by_hand) == is_fine);
+  const std::vector<float> expected = visibility;
+  CHECK(solve_in(twin.scene, gbuffer) == is_fine);
+  CHECK(visibility == expected);
+  const auto shown =
+      std::find_if(by_hand.triangle.begin(), by_hand.triangle.end(), [](std::uint32_t t) { return t != kNone; });
+  const std::size_t at = static_cast<std::size_t>(shown - by_hand.triangle.begin());
+  const std::string receiver = "receiver " + std::to_string(at) + ": ";
+  for (const double wrong : {2.0, -1e300, std::nan(""), HUGE_VAL}) {
+    GBuffer spoilt = by_hand;
+    spoilt.position[at].y = wrong;
+    CHECK(solve_in(twin.scene, spoilt) == receiver + "the G-buffer's position is not in the local frame, -1..1");
+    spoilt = by_hand;
+    spoilt.reach = wrong;
+    CHECK(solve_in(twin.scene, spoilt) == "receivers: the G-buffer's reach is not in 0..1");
+  }
+  by_hand.geometric_normal[at].z = std::nanf("");
+  CHECK(solve_in(twin.scene, by_hand) == receiver + "the G-buffer's normal is not finite");
+  *shown = 1000000;
+  CHECK(solve_in(twin.scene, by_hand) == receiver + "the G-buffer belongs to another scene: there is no such triangle");
+}
+
 TEST_CASE("under a far sun, surfaces do not shadow themselves and what is close above them does") {
   // A ball of 3,200 triangles that stands on the ground, and a plate a hundredth of its radius above the ground.
   std::vector<OwnedMesh> meshes;

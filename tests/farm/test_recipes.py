@@ -6,6 +6,7 @@ Usage: test_recipes.py HALFSHADE DIRECTORY_OF_RECIPES parallel|slurm. Exit code 
 
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -18,6 +19,14 @@ PROGRAM, RECIPES, WHICH = os.path.abspath(sys.argv[1]), pathlib.Path(sys.argv[2]
 SKIPPED = 77
 SCENE = ("builtin:fence", "--size", "64x48", "--light-samples", "36")
 PATH = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"
+
+
+def documented(script):
+    """The arguments that docs/farm.md gives a recipe, but for the picture and the scene."""
+    page = (RECIPES.parents[1] / "docs/farm.md").read_text(encoding="utf-8")
+    command = re.search(rf"`{script} (.*?)`", page).group(1).split()
+    assert command[-4:] == ["picture.exr", "scene.obj", "--size", "2048x2048"], command
+    return command[:-4]
 
 
 def need(*programs):
@@ -56,6 +65,10 @@ def test_parallel(directory):
         assert output.read_bytes() == expected, split
         assert os.listdir(output.parent) == [output.name], os.listdir(output.parent)
         output.unlink()
+    expected, arguments = whole(directory, "crop")
+    run(RECIPES / "gnu_parallel.sh", *documented("gnu_parallel.sh"), output, *arguments, HOME=str(directory))
+    assert output.read_bytes() == expected
+    output.unlink()
     # A failing job stops all; what was finished is used again.
     command = (RECIPES / "gnu_parallel.sh", "crop", 4, 2, output, *SCENE)
     try:
@@ -159,7 +172,8 @@ def test_slurm(directory):
     (directory / "slurm").mkdir()
     with LocalSlurm(directory / "slurm") as slurm:
         output = directory / "farm.exr"
-        job = run(RECIPES / "slurm_submit.sh", "crop", 4, output, *arguments, **slurm.environment()).strip()
+        split, parts = documented("slurm_submit.sh")
+        job = run(RECIPES / "slurm_submit.sh", split, parts, output, *arguments, **slurm.environment()).strip()
         assert job.isdigit(), job
 
         def ended():
@@ -170,7 +184,7 @@ def test_slurm(directory):
         assert output.exists(), logs
         assert output.read_bytes() == expected, logs
         assert not (directory / "farm.exr.parts").exists()
-        assert sorted(logs) == ["farm.exr.merge.log", *(f"farm.exr.parts.{i}.log" for i in range(1, 5))], logs
+        assert sorted(logs) == ["farm.exr.merge.log", *(f"farm.exr.parts.{i}.log" for i in range(1, int(parts) + 1))], logs
 
 
 if __name__ == "__main__":

@@ -57,6 +57,10 @@ class Values(unittest.TestCase):
         hidden = hs.unpack_masks(result.masks, 256)
         self.assertEqual(hidden.shape, (3, 256))
         self.assertEqual(hidden.sum(axis=1).tolist(), [256, 128, 0])
+        np.testing.assert_array_equal(hs.unpack_masks(result.masks.view(np.uint8), 256), hidden)
+        for wrong in (-1, 257):  # NumPy would cut off or make up samples
+            with self.assertRaisesRegex(hs.UsageError, "256 bits"):
+                hs.unpack_masks(result.masks, wrong)
 
     def test_several_lights(self):
         lights = [square(), hs.Light.point((40, 4, 0)), hs.Light.sphere((-24, 4, 0), 0.5)]
@@ -179,6 +183,17 @@ class Values(unittest.TestCase):
         )
         np.testing.assert_array_equal(single, result.visibility[0][shown])
         self.assertLess(single.min(), single.max())
+        for wrong in ({"lift": 0.5}, {"first": 1}, {"normals": world}):
+            with self.assertRaisesRegex(hs.UsageError, "go with points"):
+                self.solver.visibility(self.scene, gbuffer, square(), **wrong)
+        # A moved light needs no new picture, a moved mesh does.
+        self.solver.visibility(self.scene, gbuffer, hs.Light.point((1, 4, 0)))
+        self.scene.set_transform(0, [[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0]])
+        self.scene.commit()
+        with self.assertRaisesRegex(hs.UsageError, "older than a commit"):
+            self.solver.visibility(self.scene, gbuffer, square())
+        with self.assertRaisesRegex(hs.UsageError, "another scene"):
+            self.solver.visibility(half_plane_scene(), gbuffer, square())
         self.assertEqual(self.scene.to_world((0, 0, 0)).shape, (3,))
         for wrong in (1.0, [(1, 2)], "points"):
             with self.assertRaisesRegex(hs.UsageError, "points"):

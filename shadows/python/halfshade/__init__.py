@@ -142,4 +142,6 @@ class Solver(_halfshade.BaseSolver):
 def unpack_masks(masks, sample_count):
     """Masks as booleans: the last axis becomes light samples, True where a sample is hidden."""
     as_bytes = np.ascontiguousarray(masks).view(np.uint8)
+    if not 0 <= sample_count <= 8 * as_bytes.shape[-1]:
+        raise UsageError(f"sample_count: {sample_count}, but the masks have {8 * as_bytes.shape[-1]} bits")
     return np.unpackbits(as_bytes, axis=-1, count=sample_count, bitorder="little").view(bool)
