@@ -324,7 +324,7 @@ typedef struct halfshade_solver_desc {
 /* What a workspace keeps between calls. */
 typedef struct halfshade_workspace_desc {
   size_t struct_size; /* sizeof(halfshade_workspace_desc) */
-  /* 1..256 lights whose samples and tree, about 10 bytes per triangle, are kept from call to call. Light i of a call
+  /* 1..256 lights whose samples, and about 10 bytes per triangle, are kept from call to call. Light i of a call
    * uses place i modulo this. */
   uint32_t kept_lights;
 } halfshade_workspace_desc;
