@@ -71,8 +71,8 @@ def draw(chart, subjects):
     columns = min(len(subjects), 3)
     rows = math.ceil(len(subjects) / columns)
     # The last row is room for the legend.
-    figure, panels = pyplot.subplots(rows + 1, columns, figsize=(4.2 * columns + 0.4, 3.6 * rows + 1.1), squeeze=False,
-                                     layout="constrained", height_ratios=[3.6] * rows + [0.55])
+    figure, panels = pyplot.subplots(rows + 1, columns, figsize=(4.2 * columns + 0.4, 3.6 * rows + 1.4), squeeze=False,
+                                     layout="constrained", height_ratios=[3.6] * rows + [0.75])
     for axes in panels.flat[len(subjects):]:
         axes.remove()
     for axes, subject in zip(panels.flat, subjects):
