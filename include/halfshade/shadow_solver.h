@@ -61,9 +61,9 @@ struct SolveStats : ShadowStats {
 
 /// What a workspace keeps between calls.
 struct WorkspaceConfig {
-  /// Lights whose samples, and about 10 bytes per triangle (100 more if alpha-tested), are kept from call to call, 1..256.
-  /// Light number i of a call uses place i modulo this: what was there before is replaced. So of more lights than
-  /// places, those that share theirs with no other light of the call are kept.
+  /// Lights whose samples, and about 10 bytes per triangle (100 more if alpha-tested), are kept from call to
+  /// call, 1..256. Light number i of a call uses place i modulo this: what was there before is replaced. So of more
+  /// lights than places, those that share theirs with no other light of the call are kept.
   std::uint32_t kept_lights = 1;
 };
 
