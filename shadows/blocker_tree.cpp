@@ -299,20 +299,12 @@ void trace_groups(BlockerTree& tree) {
   });
 }
 
-std::array<vec3, 3> corners_of(const BlockerTree::Leaf& leaf, std::size_t lane) {
-  std::array<vec3, 3> corners;
-  for (int k = 0; k < 3; ++k) corners[k] = {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
-  return corners;
-}
-
 /// What a light makes of the lanes: the sides of their planes that samples lie on, and which certificates count.
 void fit_leaf(const BlockerTree::Leaf& leaf, const KernelSamples& samples, BlockerFit::Leaf& fit) {
   fit.samples_above = fit.samples_below = fit.back_faces_only = 0;
   fit.box_low = vec3(1e30f), fit.box_high = vec3(-1e30f);
   for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-    const BlockerPlane plane{{leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}, leaf.side_error[lane]};
-    const SampleSides sides =
-        sides_of_samples(plane, {leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}, samples);
+    const SampleSides sides = sides_of_samples(leaf.plane_at(lane), leaf.corner_at(0, lane), samples);
     fit.samples_above |= std::uint32_t{sides.samples_above} << lane;
     fit.samples_below |= std::uint32_t{sides.samples_below} << lane;
     if (samples.closed == nullptr) continue;
@@ -351,7 +343,8 @@ Blocker blocker_at(const BlockerTree& tree, const BlockerFit& fit, std::size_t l
                    const KernelSamples& samples) {
   const BlockerTree::Leaf& l = tree.leaves[leaf];
   const bool perforated = (l.perforated >> lane & 1) != 0;
-  Blocker b = make_blocker(corners_of(l, lane), perforated, samples, l.triangle[lane]);
+  Blocker b = make_blocker({l.corner_at(0, lane), l.corner_at(1, lane), l.corner_at(2, lane)}, perforated, samples,
+                           l.triangle[lane]);
   if (perforated) b.alpha = &fit.alpha_of(tree, leaf, lane);
   return b;
 }

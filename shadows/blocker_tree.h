@@ -51,6 +51,13 @@ struct BlockerTree {
     std::uint32_t triangle[kWidth];
     std::uint32_t first = 0, count = 0;  // run of BlockerTree::order
     std::uint32_t vertices = 0, perforated = 0;
+
+    vec3 corner_at(std::size_t k, std::size_t lane) const {
+      return {corner[k][0][lane], corner[k][1][lane], corner[k][2][lane]};
+    }
+    BlockerPlane plane_at(std::size_t lane) const {
+      return {{normal[0][lane], normal[1][lane], normal[2][lane]}, side_error[lane]};
+    }
   };
   std::vector<std::uint32_t> order;  // triangles, leaf by leaf
   std::vector<Leaf> leaves;

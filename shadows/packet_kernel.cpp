@@ -78,10 +78,6 @@ class PacketSolver {
     return {receivers_.x[i], receivers_.y[i], receivers_.z[i]};
   }
 
-  static vec3 Corner(const BlockerTree::Leaf& leaf, std::size_t k, std::size_t lane) {
-    return {leaf.corner[k][0][lane], leaf.corner[k][1][lane], leaf.corner[k][2][lane]};
-  }
-
   const ExactScene& scene_;
   const SampleRows& rows_;
   const ReceiverBox& cluster_;
@@ -275,7 +271,7 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
           const auto i = static_cast<std::size_t>(std::countr_zero(t));
           if (!within(seen.ranges, i, column)) continue;
           ++counters_.exact_fallbacks;
-          is_blocked = blocks(Corner(leaf, 0, i), Corner(leaf, 1, i), Corner(leaf, 2, i), Position(lane),
+          is_blocked = blocks(leaf.corner_at(0, i), leaf.corner_at(1, i), leaf.corner_at(2, i), Position(lane),
                               scene_.samples->points[first + bit]);
         }
       }
@@ -470,8 +466,8 @@ bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, st
   PacketTriangle triangle;
   triangle.alpha = (leaf.perforated >> lane & 1) != 0 ? &scene_.fit->alpha_of(*scene_.tree, index, lane) : nullptr;
   if (triangle.alpha != nullptr) std::fill(std::begin(texels_), std::end(texels_), std::nullopt);
-  for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = Corner(leaf, k, lane);
-  triangle.plane = {{leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}, leaf.side_error[lane]};
+  for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = leaf.corner_at(k, lane);
+  triangle.plane = leaf.plane_at(lane);
   triangle.samples_above = fit.samples_above >> lane & 1, triangle.samples_below = fit.samples_below >> lane & 1;
   SetPlanes(triangle);
   const bool above = (view.above >> lane) & 1, below = (view.below >> lane) & 1;
