@@ -6,10 +6,10 @@
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/level_engine.h"
-#include "shadows/morton_order.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/receiver_request.h"
 #include "shadows/solver.h"
+#include "shadows/space_curve.h"
 
 namespace halfshade {
 namespace {
@@ -43,7 +43,7 @@ struct Progression {
 };
 
 void start(const ReceiverArray& receivers, Progression& p) {
-  p.order = morton_order(receivers.position, [](std::uint32_t) { return true; });
+  p.order = order_along<MortonCurve>(receivers.position, [](std::uint32_t) { return true; });
   const std::size_t count = p.order.size();
   p.rounds.assign(count, 0), p.samples.assign(count, 0), p.visible.assign(count, 0), p.open.assign(count, 1);
   p.weight.assign(count, 0.0), p.weighted.assign(count, 0.0), p.weighted_sq.assign(count, 0.0);

@@ -19,11 +19,12 @@ constexpr std::size_t kClustersPerTask = 2;
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
 constexpr double kGrazing = 1e-5;
 
-/// Receivers in front of the light on its z > 0 side, in Morton order of their positions, so that runs are compact.
+/// Receivers in front of the light on its z > 0 side, along Hilbert's curve through their positions: the packets and
+/// clusters that they form must be compact.
 void order_receivers(const ReceiverArray& receivers, const LightFrame& frame, ExactWork& work) {
-  morton_order(
+  order_along<HilbertCurve>(
       receivers.position, [&](std::uint32_t i) { return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing; },
-      work.morton, work.order);
+      work.curve, work.order);
 }
 
 /// One set into its bins: counted, then placed in order.
@@ -234,7 +235,7 @@ void ScratchPool::give(ExactScratch& scratch) {
 
 void ExactWork::reserve(std::size_t count, std::size_t words) {
   const std::size_t padded = count + KernelReceivers::kLanePadding;
-  morton.reserve(count);
+  curve.reserve(count);
   order.reserve(count);
   receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
   receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);

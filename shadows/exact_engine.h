@@ -12,7 +12,7 @@
 #include "shadows/closed_components.h"
 #include "shadows/exact_kernel.h"
 #include "shadows/light_view.h"
-#include "shadows/morton_order.h"
+#include "shadows/space_curve.h"
 
 namespace halfshade {
 
@@ -61,7 +61,7 @@ class ScratchPool {
 
 /// Scratch of a call.
 struct ExactWork {
-  MortonScratch morton;
+  CurveScratch curve;
   std::vector<std::uint32_t> order;
   KernelReceivers receivers;
   ScratchPool scratches;

@@ -42,7 +42,8 @@ struct PictureLines {
 
 /// What a cluster of receivers sees of a group (packet_kernel.cpp).
 struct GroupView {
-  bool known = false;  // looked at
+  bool known = false;     // looked at
+  bool is_empty = false;  // nothing hides anything
   std::uint32_t first = 0, fixed = 0,
                 turning = 0;  // runs of ExactScratch::net_edges: `fixed` edges, then `turning` ones
   // Triangles of each leaf, as bits: those that are seen from one side; plain ones that may be seen from either;

@@ -52,7 +52,8 @@ struct Packet : ReceiverBox {
   Vec column, row, height;        // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                    // own triangle
   const PictureLines* lines;      // where the rows lie
-  std::uint32_t any_open[kMaxLines];                                // what some receiver has open
+  float open_low[2], open_high[2];    // columns and rows from the centre between which lies what some receiver has open
+  std::uint32_t any_open[kMaxLines];  // what some receiver has open
   alignas(HWY_MAX_BYTES) std::uint32_t open[kMaxLines][kMaxLanes];  // bit i: sample i of the line is not blocked yet
 };
 
@@ -363,6 +364,44 @@ HWY_INLINE LaneMask ReceiversOverOpenSamples(const SampleRows& rows, const std::
     return false;
   });
   return receivers;
+}
+
+/// The receivers for which a triangle reaches into the pyramid between them and what is open of the light: all but
+/// those with all corners beyond one of its sides or behind them. From r, a point at r + way lies over column
+/// column(r) + way_x height / down, and so beyond column c where way_x height > (c - column(r)) down, also for points
+/// behind the receiver.
+HWY_INLINE LaneMask ReceiversBelow(const SampleRows& rows, const LightFrame& frame, const BlockerTree::Leaf& leaf,
+                                   std::size_t triangle, const Packet& packet) {
+  const Tag d;
+  const Vec3 down_axis = Splat(vec3(-frame.n));
+  const Vec3 axis[2] = {Splat(rows.axis_x * rows.scale), Splat(rows.axis_y * rows.row_scale)};
+  const float scale[2] = {rows.scale, rows.row_scale};
+  const Vec place[2] = {packet.column, packet.row};
+  Vec way_scale[2], limit[2][2];  // per axis; from the receiver to the low and the high side
+  for (int k = 0; k < 2; ++k) {
+    const float pad = rows.deviation * scale[k] + 1e-3f;
+    limit[k][0] = hn::Sub(hn::Set(d, packet.open_low[k] - pad), place[k]);
+    limit[k][1] = hn::Sub(hn::Set(d, packet.open_high[k] + pad), place[k]);
+    way_scale[k] = packet.height;
+  }
+  const LaneMask none = hn::Lt(hn::Zero(d), hn::Zero(d)), all = hn::Not(none);
+  LaneMask beyond[2][2] = {{all, all}, {all, all}}, behind = all;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Vec3 way = Subtract(Splat(leaf.corner_at(c, triangle)), packet.position);
+    const Vec down = Dot(way, down_axis), error = hn::Mul(Norm1(way), hn::Set(d, 0x1p-20f));
+    behind = hn::And(behind, hn::Lt(down, hn::Neg(error)));
+    for (int k = 0; k < 2; ++k) {
+      const Vec across = hn::Mul(Dot(way, axis[k]), way_scale[k]);
+      for (int side = 0; side < 2; ++side) {
+        const Vec bound = hn::Mul(limit[k][side], down);
+        const Vec off = hn::Mul(
+            error, hn::MulAdd(way_scale[k], hn::Set(d, scale[k]), hn::Add(hn::Abs(limit[k][side]), hn::Abs(place[k]))));
+        beyond[k][side] = hn::And(
+            beyond[k][side], side == 0 ? hn::Lt(hn::Add(across, off), bound) : hn::Gt(hn::Sub(across, off), bound));
+      }
+    }
+  }
+  return hn::Not(hn::Or(behind, hn::Or(hn::Or(beyond[0][0], beyond[0][1]), hn::Or(beyond[1][0], beyond[1][1]))));
 }
 
 }  // namespace HWY_NAMESPACE

@@ -141,16 +141,18 @@ bool PacketSolver::FindOpenPart() {
   const std::uint64_t all = columns[0] | std::uint64_t{columns[1]} << 32;
   if (all == 0) return false;
   const float pad = ProjectionPad(packet_.shaft.low[2]) + rows_.deviation;
-  const auto low = static_cast<float>(std::countr_zero(all)), high = static_cast<float>(63 - std::countl_zero(all));
-  packet_.shaft.light = {(low - rows_.most_offset) / rows_.scale - pad,
-                         (static_cast<float>(first) - rows_.most_row_offset) / rows_.row_scale - pad,
-                         (high - rows_.least_offset) / rows_.scale + pad,
-                         (static_cast<float>(last) - rows_.least_row_offset) / rows_.row_scale + pad};
+  packet_.open_low[0] = static_cast<float>(std::countr_zero(all)) - rows_.most_offset;
+  packet_.open_low[1] = static_cast<float>(first) - rows_.most_row_offset;
+  packet_.open_high[0] = static_cast<float>(63 - std::countl_zero(all)) - rows_.least_offset;
+  packet_.open_high[1] = static_cast<float>(last) - rows_.least_row_offset;
+  packet_.shaft.light = {packet_.open_low[0] / rows_.scale - pad, packet_.open_low[1] / rows_.row_scale - pad,
+                         packet_.open_high[0] / rows_.scale + pad, packet_.open_high[1] / rows_.row_scale + pad};
   return true;
 }
 
 /// Up to 16 leaves; true where samples were blocked.
 bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& view) {
+  if (view.known && view.is_empty) return false;
   const float* const low[3] = {group.low[0], group.low[1], group.low[2]};
   const float* const high[3] = {group.high[0], group.high[1], group.high[2]};
   std::uint32_t leaves = 0;
@@ -457,6 +459,8 @@ bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, st
                                                 leaf.corner_vertex[2][lane]};
     active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[lane], vertices_, range, packet_, lines));
   } else {
+    active = hn::And(active, ReceiversBelow(rows_, scene_.frame, leaf, lane, packet_));
+    if (hn::AllFalse(d, active)) return false;
     range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
       lines.add(line);
       return false;

@@ -85,6 +85,7 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
                                           first_leaf * BlockerTree::kWidth),
              own_end = std::lower_bound(own_begin, scratch.own_places.end(),
                                         (first_leaf + group.count) * BlockerTree::kWidth);
+  view.is_empty = true;
   std::uint8_t turns[BlockerTree::kGroupSlots + 1];
   std::uint16_t positive[BlockerTree::kGroupSlots + 1], negative[BlockerTree::kGroupSlots + 1];
   for (std::uint32_t k = 0; k < group.count; ++k) {
@@ -99,6 +100,7 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
     view.patch[k] = static_cast<std::uint16_t>(known);
     view.turns[k] = static_cast<std::uint16_t>(plain & ~known);
     view.single[k] = static_cast<std::uint16_t>(sides.active & ~plain);
+    view.is_empty = view.is_empty && sides.active == 0;
     for (std::uint32_t lane = 0; lane < BlockerTree::kWidth; ++lane) {
       const std::size_t at = BlockerTree::kWidth * k + lane;
       positive[at] = (known & sides.above) >> lane & 1 ? kAll : 0;
@@ -210,6 +212,8 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
   const std::uint16_t* const positive_of = turning ? scratch_.facing.data() + view.facing : nullptr;
   const std::uint16_t* const negative_of = turning ? positive_of + BlockerTree::kGroupSlots + 1 : nullptr;
   const std::uint32_t in_packet = (1u << packet_.count) - 1;
+  const Vec row_scale = hn::Set(d, rows_.row_scale), top = hn::Set(d, static_cast<float>(rows_.rows) - 1.0f);
+  constexpr float kSlack = 1e-3f;
   const auto slot_of = [&](std::uint16_t v) {
     if (projected_in_[v] != calls_) {
       projected_in_[v] = calls_;
@@ -240,7 +244,16 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
                                          hn::Ge(hn::Add(high[1], pad), hn::Set(d, open.low_v))),
                                  hn::Le(hn::Sub(low[0], pad), hn::Set(d, open.high_u)));
     const std::uint64_t beside = Bits(hn::Lt(hn::Add(high[0], pad), hn::Set(d, open.low_u)));
-    std::uint64_t bits = Bits(may) & ((std::uint64_t{1} << std::min<std::size_t>(hn::Lanes(d), end - e)) - 1);
+    // Rows that may be crossed; short edges may lie between two.
+    const Vec first_row = hn::Ceil(hn::MulAdd(hn::Max(hn::Sub(low[1], pad), hn::Set(d, open.low_v)), row_scale,
+                                              hn::Set(d, rows_.least_row_offset - kSlack))),
+              last_row = hn::Floor(hn::MulAdd(hn::Min(hn::Add(high[1], pad), hn::Set(d, open.high_v)), row_scale,
+                                              hn::Set(d, rows_.most_row_offset + kSlack)));
+    alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
+    hn::Store(hn::ConvertTo(di, hn::Max(first_row, hn::Zero(d))), di, first);
+    hn::Store(hn::ConvertTo(di, hn::Min(last_row, top)), di, last);
+    std::uint64_t bits = Bits(hn::And(may, hn::Le(first_row, last_row))) &
+                         ((std::uint64_t{1} << std::min<std::size_t>(hn::Lanes(d), end - e)) - 1);
     std::uint16_t positive[kMaxLanes] = {}, negative[kMaxLanes] = {};
     std::uint32_t twice = 0;
     if (turning) {
@@ -261,13 +274,6 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
             OutlineEdges::kMost ||
         slots_ + 2 * static_cast<std::uint32_t>(std::popcount(bits)) > ProjectedVertices::kMost)
       return false;
-    alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
-    const Vec row_scale = hn::Set(d, rows_.row_scale), top = hn::Set(d, static_cast<float>(rows_.rows) - 1.0f);
-    const auto row = [&](Vec v, float offset) HWY_ATTR {
-      return hn::ConvertTo(di, hn::Min(hn::Max(hn::MulAdd(v, row_scale, hn::Set(d, offset)), hn::Zero(d)), top));
-    };
-    hn::Store(row(hn::Sub(low[1], pad), rows_.least_row_offset), di, first);
-    hn::Store(row(hn::Add(high[1], pad), rows_.most_row_offset), di, last);
     for (; bits != 0; bits &= bits - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
       const std::uint32_t i = edges_.count++;
@@ -301,12 +307,18 @@ HWY_INLINE void GroupOutline::Set() {
     for (std::uint64_t& word : edges_.left_on_row[row]) word = 0;
   }
   bool near[ProjectedVertices::kMost];
+  alignas(HWY_MAX_BYTES) float behind[ProjectedVertices::kMost][kMaxLanes];  // the row that the vertex lies behind
   for (std::uint32_t v = 0; v < slots_; ++v) {
     const Vec row = hn::Add(hn::Load(d, vertices_.row[v]), row_offset);
     const Vec error = hn::MulAdd(hn::Load(d, vertices_.error[v]), row_scale, spread);
     near[v] = !hn::AllFalse(d, hn::Le(hn::Abs(hn::Sub(row, hn::Round(row))), error));
+    hn::Store(hn::Floor(row), d, behind[v]);
   }
   for (std::uint32_t e = 0; e < edges_.count; ++e) {
+    // Many short edges lie between two rows for all receivers.
+    if (!near[edges_.from[e]] && !near[edges_.to[e]] &&
+        hn::AllTrue(d, hn::Eq(hn::Load(d, behind[edges_.from[e]]), hn::Load(d, behind[edges_.to[e]]))))
+      continue;
     auto& on_row = edges_.left[e] ? edges_.left_on_row : edges_.on_row;
     for (std::uint32_t row = edges_.first_row[e]; row <= edges_.last_row[e]; ++row)
       on_row[row][e / 64] |= std::uint64_t{1} << (e % 64);

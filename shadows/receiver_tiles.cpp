@@ -1,6 +1,6 @@
 #include "shadows/receiver_tiles.h"
 
-#include "shadows/morton_order.h"
+#include "shadows/space_curve.h"
 
 namespace halfshade {
 namespace {
@@ -17,7 +17,7 @@ std::vector<LatticeBox> boxes_of_runs(const ReceiverArray& receivers, const std:
 ReceiverTiles make_receiver_tiles(const ReceiverArray& receivers) {
   ReceiverTiles tiles;
   for (const vec3& p : receivers.position) tiles.box.add(p);
-  tiles.order = morton_order(receivers.position, [](std::uint32_t) { return true; });
+  tiles.order = order_along<HilbertCurve>(receivers.position, [](std::uint32_t) { return true; });
   tiles.tiles = boxes_of_runs(receivers, tiles.order, ReceiverTiles::kTile);
   tiles.blocks = boxes_of_runs(receivers, tiles.order, ReceiverTiles::kBlock);
   return tiles;

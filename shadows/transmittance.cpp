@@ -5,9 +5,9 @@
 #include "rasterizer/core/parallel.h"
 #include "rasterizer/core/stopwatch.h"
 #include "shadows/light_view.h"
-#include "shadows/morton_order.h"
 #include "shadows/shaft.h"
 #include "shadows/solver.h"
+#include "shadows/space_curve.h"
 #include "shadows/transmittance_kernel.h"
 
 namespace halfshade {
@@ -204,7 +204,8 @@ void solve_transmittance(const Panes& panes, const ReceiverArray& receivers, con
   prepare(light, pass);
   if (panes.empty()) pass.fit.nodes.emplace_back();  // a root without children
   const std::size_t size = std::clamp<std::size_t>(kMostTileWords / (3 * pass.kernel.padded), 1, tile);
-  const std::vector<std::uint32_t> order = morton_order(receivers.position, [](std::uint32_t) { return true; });
+  const std::vector<std::uint32_t> order =
+      order_along<HilbertCurve>(receivers.position, [](std::uint32_t) { return true; });
   const std::size_t per_task = size * kTilesPerTask, tasks = (order.size() + per_task - 1) / per_task;
   std::vector<TransmittanceTile> tiles(std::min(tasks, kTasksPerRound));
   for (std::size_t first = 0; first < tasks; first += tiles.size()) {

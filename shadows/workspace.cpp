@@ -25,7 +25,7 @@ std::uint64_t bytes_of(const LitReceivers& r) {
 
 std::uint64_t bytes_of(const ExactWork& work) {
   const KernelReceivers& r = work.receivers;
-  return bytes_of(work.morton.keys) + bytes_of(work.morton.scratch) + bytes_of(work.order) + bytes_of(r.x) +
+  return bytes_of(work.curve.keys) + bytes_of(work.curve.scratch) + bytes_of(work.order) + bytes_of(r.x) +
          bytes_of(r.y) + bytes_of(r.z) + bytes_of(r.own) + bytes_of(r.open) + bytes_of(r.set) + bytes_of(r.masks);
 }
 
