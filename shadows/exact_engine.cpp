@@ -151,7 +151,8 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const auto solve = rows.empty() ? solve_cluster : solve_packets;
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
-  work.scratches.start(concurrency());
+  const std::size_t nodes = blockers.tree->nodes.size();
+  work.scratches.start(concurrency(), nodes, rows.empty() ? blockers.tree->leaves.size() : nodes);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
@@ -192,15 +193,15 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 }  // namespace
 
-void ScratchPool::start(std::size_t threads) {
+void ScratchPool::start(std::size_t threads, std::size_t nodes, std::size_t listed) {
   while (scratches_.size() < threads) scratches_.push_back(std::make_unique<ExactScratch>());
-  std::size_t leaves = 0, nodes = 0, groups = 0, edges = 0, facing = 0;
+  constexpr std::size_t kPadding = 64;  // of boxes to whole vectors
+  const std::size_t leaves = listed + kPadding;
+  std::size_t groups = 0, edges = 0, facing = 0;
   for (const auto& s : scratches_) {
     groups = std::max(groups, s->groups.size());
     facing = std::max(facing, s->facing.capacity());
     edges = std::max(edges, s->net_edges.vertex[0].size());
-    leaves = std::max({leaves, s->leaf.capacity(), s->low[0].capacity(), s->keys.capacity()});
-    nodes = std::max(nodes, s->stack.capacity());
   }
   free_.clear();
   for (const auto& s : scratches_) {
