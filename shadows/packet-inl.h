@@ -377,28 +377,29 @@ HWY_INLINE LaneMask ReceiversBelow(const SampleRows& rows, const LightFrame& fra
   const Vec3 axis[2] = {Splat(rows.axis_x * rows.scale), Splat(rows.axis_y * rows.row_scale)};
   const float scale[2] = {rows.scale, rows.row_scale};
   const Vec place[2] = {packet.column, packet.row};
-  Vec way_scale[2], limit[2][2];  // per axis; from the receiver to the low and the high side
+  // In units of 2^-24: a coordinate of `way` is within 5 |way|, column and height of the receiver within 6 |r - c|; and
+  // samples lie off the light's plane by `deviation`.
+  const Vec unit = hn::Set(d, 0x1p-20f);
+  const Vec spread = hn::MulAdd(hn::Add(packet.height, packet.place_error), unit, hn::Set(d, 2.0f * rows.deviation));
+  Vec limit[2][2], off[2][2];  // [axis][side]: from the receiver to the side; its error, a unit of |way|
   for (int k = 0; k < 2; ++k) {
     const float pad = rows.deviation * scale[k] + 1e-3f;
     limit[k][0] = hn::Sub(hn::Set(d, packet.open_low[k] - pad), place[k]);
     limit[k][1] = hn::Sub(hn::Set(d, packet.open_high[k] + pad), place[k]);
-    way_scale[k] = packet.height;
+    for (int side = 0; side < 2; ++side)
+      off[k][side] = hn::MulAdd(hn::Abs(limit[k][side]), unit, hn::Mul(spread, hn::Set(d, scale[k])));
   }
   const LaneMask none = hn::Lt(hn::Zero(d), hn::Zero(d)), all = hn::Not(none);
   LaneMask beyond[2][2] = {{all, all}, {all, all}}, behind = all;
   for (std::size_t c = 0; c < 3; ++c) {
     const Vec3 way = Subtract(Splat(leaf.corner_at(c, triangle)), packet.position);
-    const Vec down = Dot(way, down_axis), error = hn::Mul(Norm1(way), hn::Set(d, 0x1p-20f));
-    behind = hn::And(behind, hn::Lt(down, hn::Neg(error)));
+    const Vec down = Dot(way, down_axis), length = Norm1(way);
+    behind = hn::And(behind, hn::Lt(down, hn::Neg(hn::Mul(length, unit))));
     for (int k = 0; k < 2; ++k) {
-      const Vec across = hn::Mul(Dot(way, axis[k]), way_scale[k]);
-      for (int side = 0; side < 2; ++side) {
-        const Vec bound = hn::Mul(limit[k][side], down);
-        const Vec off = hn::Mul(
-            error, hn::MulAdd(way_scale[k], hn::Set(d, scale[k]), hn::Add(hn::Abs(limit[k][side]), hn::Abs(place[k]))));
-        beyond[k][side] = hn::And(
-            beyond[k][side], side == 0 ? hn::Lt(hn::Add(across, off), bound) : hn::Gt(hn::Sub(across, off), bound));
-      }
+      const Vec across = hn::Mul(Dot(way, axis[k]), packet.height);
+      const Vec past_low = hn::MulAdd(off[k][0], length, across), past_high = hn::NegMulAdd(off[k][1], length, across);
+      beyond[k][0] = hn::And(beyond[k][0], hn::Lt(past_low, hn::Mul(limit[k][0], down)));
+      beyond[k][1] = hn::And(beyond[k][1], hn::Gt(past_high, hn::Mul(limit[k][1], down)));
     }
   }
   return hn::Not(hn::Or(behind, hn::Or(hn::Or(beyond[0][0], beyond[0][1]), hn::Or(beyond[1][0], beyond[1][1]))));

@@ -177,3 +177,37 @@ TEST_CASE(
                      solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
   }
 }
+
+TEST_CASE("triangles at a receiver's height that end where what is asked of the light does, give the oracle's bits") {
+  // Receivers low over the plane of a small light and far to its side, whose place and height are known least well; each
+  // with triangles that have an edge in a plane through it and one of the light's outer columns or rows.
+  Light light = frame_light();
+  light.u *= 0.05, light.v *= 0.05;
+  ShadowConfig config = frame_config(64);
+  config.pattern = SamplePattern::kRows;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    CAPTURE(seed);
+    Random random(seed);
+    std::vector<Triangle> triangles;
+    std::vector<dvec3> points;
+    for (int i = 0; i < 96; ++i) {
+      const double height = std::exp2(-random.uniform(1.0, 9.0));
+      const dvec3 r = light.center + dvec3(random.uniform(-0.3, 0.3), -height, random.uniform(-4.0, 4.0));
+      points.push_back(r);
+      for (int k = 0; k < 4; ++k) {
+        const dvec3 out = k < 2 ? light.u : light.v, along = k < 2 ? light.v : light.u;
+        const double side = k % 2 == 0 ? 1.0 : -1.0, column = 7.0 / 8.0 + random.uniform(-1e-3, 1e-3);
+        const dvec3 l = light.center + side * column * out, q = glm::mix(r, l, random.uniform(0.01, 0.3));
+        const double reach = random.uniform(0.5, 4.0) * glm::length(q - r);
+        const dvec3 edge = glm::normalize(along) * reach + (l - r) * random.uniform(-0.3, 0.3);
+        triangles.push_back({q + edge, q - edge, q + glm::normalize(out) * side * reach * 0.2});
+      }
+    }
+    const Scene scene = scene_of(triangles);
+    const auto masks = solve(scene, receivers_at(points), light, config, ShadowMethod::kOracle);
+    std::uint64_t blocked = 0;
+    for (const std::uint64_t word : masks.words) blocked += static_cast<std::uint64_t>(std::popcount(word));
+    CHECK(blocked > 100);
+    CHECK(wrong_bits(solve(scene, receivers_at(points), light, config, ShadowMethod::kExact), masks) == 0);
+  }
+}
