@@ -179,8 +179,8 @@ TEST_CASE(
 }
 
 TEST_CASE("triangles at a receiver's height that end where what is asked of the light does, give the oracle's bits") {
-  // Receivers low over the plane of a small light and far to its side, whose place and height are known least well; each
-  // with triangles that have an edge in a plane through it and one of the light's outer columns or rows.
+  // Receivers low over the plane of a small light and far to its side, whose place and height are known least well;
+  // each with triangles that have an edge in a plane through it and one of the light's outer columns or rows.
   Light light = frame_light();
   light.u *= 0.05, light.v *= 0.05;
   ShadowConfig config = frame_config(64);
