@@ -46,8 +46,8 @@ struct ExactLight {
 /// One for each thread at work, kept from call to call.
 class ScratchPool {
  public:
-  /// Room for so many threads and for lists of so many leaves (groups) of a tree; nothing is left of earlier calls but
-  /// memory, the same for all: which cluster meets which scratch changes from call to call.
+  /// Room for so many threads, for a tree of so many nodes, and for lists of so many of its leaves (groups); nothing is
+  /// left of earlier calls but memory, the same for all: which cluster meets which scratch changes from call to call.
   void start(std::size_t threads, std::size_t nodes, std::size_t listed);
   ExactScratch& take();
   void give(ExactScratch& scratch);

@@ -513,7 +513,7 @@ void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, K
       scratch.own_places.push_back(place[receivers.own[i]]);
   }
   std::sort(scratch.own_places.begin(), scratch.own_places.end());
-  if (scratch.groups.size() < scratch.leaf.size()) scratch.groups.resize(2 * scratch.leaf.size());
+  if (scratch.groups.size() < scratch.leaf.size()) scratch.groups.resize(scratch.leaf.size());
   for (GroupView& view : scratch.groups) view.known = false;
   scratch.net_edges.count = 0;
   scratch.facing.clear();

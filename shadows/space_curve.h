@@ -18,7 +18,7 @@ inline std::uint32_t spread_bits(std::uint32_t x) {
   return (x | x << 2) & 0x09249249u;
 }
 
-/// By the bits of all three axes in turn: jumps far at every second step. Axes are stretched alike.
+/// By the bits of all three axes in turn: every second step jumps. Cells are stretched with the box around the points.
 struct MortonCurve {
   static vec3 cells(const vec3& extent) { return 1023.0f / glm::max(extent, vec3(1e-30f)); }
   static std::uint32_t code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -39,7 +39,7 @@ class HilbertCurve {
  public:
   static vec3 cells(const vec3& extent) { return vec3(1023.0f / std::max({extent.x, extent.y, extent.z, 1e-30f})); }
   static std::uint32_t code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    const std::uint32_t bits = spread_bits(x) | spread_bits(y) << 1 | spread_bits(z) << 2;
+    const std::uint32_t bits = MortonCurve::code(x, y, z);
     std::uint32_t code = 0, state = 0;
     for (int shift = 27; shift >= 0; shift -= 3) {
       const Step step = kSteps[8 * state + (bits >> shift & 7)];
