@@ -196,16 +196,17 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 void ScratchPool::start(std::size_t threads, std::size_t nodes, std::size_t listed) {
   while (scratches_.size() < threads) scratches_.push_back(std::make_unique<ExactScratch>());
   const std::size_t leaves = listed + KernelReceivers::kLanePadding;
-  std::size_t edges = 0, facing = 0;
+  std::size_t edges = 0, facing = 0, turning = 0;
   for (const auto& s : scratches_) {
     facing = std::max(facing, s->facing.capacity());
+    turning = std::max(turning, s->turning.capacity());
     edges = std::max(edges, s->net_edges.vertex[0].size());
   }
   free_.clear();
   for (const auto& s : scratches_) {
     s->stack.reserve(nodes), s->leaf.reserve(leaves), s->keys.reserve(leaves);
     s->groups.reserve(nodes), s->own_places.reserve(kCluster), s->net_edges.reserve(edges);
-    s->facing.reserve(facing);
+    s->facing.reserve(facing), s->turning.reserve(turning);
     s->old_leaf.reserve(leaves), s->old_bound.reserve(leaves);
     for (int k = 0; k < 3; ++k) s->low[k].reserve(leaves), s->high[k].reserve(leaves);
     s->lines.placed = PictureLines::kNothing;

@@ -44,8 +44,9 @@ struct PictureLines {
 struct GroupView {
   bool known = false;     // looked at
   bool is_empty = false;  // nothing hides anything
-  std::uint32_t first = 0, fixed = 0,
-                turning = 0;  // runs of ExactScratch::net_edges: `fixed` edges, then `turning` ones
+  // Runs of ExactScratch::net_edges: `fixed` edges, then `turning` ones, which are those of triangles that turn; and of
+  // ExactScratch::turning: these triangles.
+  std::uint32_t first = 0, fixed = 0, turning = 0, first_triangle = 0, triangles = 0;
   // Triangles of each leaf, as bits: those that are seen from one side; plain ones that may be seen from either;
   // others.
   std::uint16_t patch[BlockerTree::kWidth], turns[BlockerTree::kWidth], single[BlockerTree::kWidth];
@@ -70,6 +71,14 @@ struct NetEdges {
   }
 };
 
+/// A triangle that some receivers of a cluster may see from above and others from below.
+struct TurningTriangle {
+  vec3 corner, normal;
+  float side_error;     // as in BlockerPlane
+  std::uint16_t place;  // in the group: 16 x child + lane
+  bool samples_above, samples_below;
+};
+
 /// Scratch of one thread, and what it counted.
 struct ExactScratch {
   PictureLines lines;
@@ -81,9 +90,11 @@ struct ExactScratch {
   std::vector<GroupView> groups;          // of the groups listed in `leaf`
   std::vector<std::uint32_t> own_places;  // BlockerTree::place of the receivers' own triangles
   NetEdges net_edges;
-  // [triangle, kGroupSlots for none] of a group: receivers of the packet at work that see it from below, so that its
-  // outline is positive; then the same from above. As bits; all or none where a triangle does not turn.
-  std::vector<std::uint16_t> facing;
+  std::vector<TurningTriangle> turning;
+  // [triangle, kGroupSlots for none] of a group: receivers of the packet at work, as bits. From 16 on those that see it
+  // from below, so that its outline is positive; from 0 on those that see it from above. All or none where a triangle
+  // does not turn.
+  std::vector<std::uint32_t> facing;
   KernelCounters counters;
   std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0;
 };

@@ -59,7 +59,7 @@ class PacketSolver {
   bool RasterizeGroup(const BlockerTree::Node& group, GroupView& view);
   bool RasterizePatch(const BlockerTree::Node& group, const GroupView& view, const std::uint16_t* patch,
                       std::uint32_t leaves, bool& added);
-  void FindTurns(const BlockerTree::Node& group, GroupView& view, std::uint32_t leaves, std::uint16_t* certain);
+  void FindTurns(const GroupView& view, std::uint32_t leaves, std::uint16_t* patch);
   void SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves, std::uint32_t line,
                    const std::uint32_t* doubtful, std::uint32_t* blocked);
   const LeafView& ViewLeaf(const BlockerTree::Node& group, std::uint32_t k);
@@ -121,6 +121,7 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   scratch_.lines.place(*scene_.rows, receivers_.set.data() + first, count);
   packet_.lines = &scratch_.lines;
   for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
+  outline_.Begin();
   return FindOpenPart();
 }
 
@@ -166,7 +167,7 @@ bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& vie
   viewed_ = 0;
   bool added = false;
   std::uint16_t patch[BlockerTree::kWidth];
-  FindTurns(group, view, leaves, patch);
+  FindTurns(view, leaves, patch);
   int in_patch = 0;
   for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1)
     in_patch += std::popcount(patch[std::countr_zero(rest)]);
@@ -185,35 +186,21 @@ bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& vie
 
 /// From which side each receiver sees the triangles that turn. Those of `leaves` for which that is certain for everyone
 /// join the patch, which is returned.
-void PacketSolver::FindTurns(const BlockerTree::Node& group, GroupView& view, std::uint32_t leaves,
-                             std::uint16_t* patch) {
+void PacketSolver::FindTurns(const GroupView& view, std::uint32_t leaves, std::uint16_t* patch) {
   const Tag d;
   const LaneMask everyone = hn::FirstN(d, packet_.count);
   std::copy_n(view.patch, BlockerTree::kWidth, patch);
-  if (view.turning == 0) return;
-  std::uint16_t* const positive = scratch_.facing.data() + view.facing;
-  std::uint16_t* const negative = positive + BlockerTree::kGroupSlots + 1;
-  for (std::uint32_t k = 0; k < group.count; ++k) {
-    if (view.turns[k] == 0) continue;
-    const bool is_listed = (leaves >> k & 1) != 0;
-    const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
-    const BlockerFit::Leaf& fit = scene_.fit->leaves[group.first_leaf() + k];
-    const std::uint32_t samples_below = SamplesBelow(fit, cluster_.low, cluster_.high);
-    for (std::uint32_t rest = view.turns[k]; rest != 0; rest &= rest - 1) {
-      const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-      const std::size_t at = BlockerTree::kWidth * k + lane;
-      positive[at] = negative[at] = 0;
-      if (!is_listed) continue;
-      const Vec3 to_corner = Subtract(
-          Splat({leaf.corner[0][0][lane], leaf.corner[0][1][lane], leaf.corner[0][2][lane]}), packet_.position);
-      const Vec side = Dot(Splat({leaf.normal[0][lane], leaf.normal[1][lane], leaf.normal[2][lane]}), to_corner),
-                error = hn::Mul(hn::Set(d, leaf.side_error[lane]), Norm1(to_corner));
-      if (!hn::AllFalse(d, hn::And(everyone, hn::Le(hn::Abs(side), error)))) continue;
-      patch[k] |= static_cast<std::uint16_t>(1u << lane);
-      const auto above = static_cast<std::uint16_t>(Bits(hn::Gt(side, hn::Zero(d))));
-      if (fit.samples_above >> lane & 1) positive[at] = above;
-      if (samples_below >> lane & 1) negative[at] = static_cast<std::uint16_t>(~above);
-    }
+  std::uint32_t* const facing = scratch_.facing.data() + view.facing;
+  for (const TurningTriangle& t : std::span(scratch_.turning).subspan(view.first_triangle, view.triangles)) {
+    const std::uint32_t leaf = t.place / BlockerTree::kWidth;
+    facing[t.place] = 0;
+    if ((leaves >> leaf & 1) == 0) continue;
+    const Vec3 to_corner = Subtract(Splat(t.corner), packet_.position);
+    const Vec side = Dot(Splat(t.normal), to_corner), error = hn::Mul(hn::Set(d, t.side_error), Norm1(to_corner));
+    if (!hn::AllFalse(d, hn::And(everyone, hn::Le(hn::Abs(side), error)))) continue;
+    patch[leaf] |= static_cast<std::uint16_t>(1u << t.place % BlockerTree::kWidth);
+    const auto above = static_cast<std::uint32_t>(Bits(hn::Gt(side, hn::Zero(d))));
+    facing[t.place] = (t.samples_above ? above << 16 : 0) | (t.samples_below ? ~above & 0xffff : 0);
   }
 }
 
@@ -269,7 +256,7 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
         if (patch[k] == 0 || !within(leaf_ranges_, k, column)) continue;
         const BlockerTree::Leaf& leaf = scene_.tree->leaves[group.first_leaf() + k];
         const LeafView& seen = ViewLeaf(group, k);
-        for (std::uint32_t t = patch[k]; t != 0 && !is_blocked; t &= t - 1) {
+        for (std::uint32_t t = patch[k] & seen.active; t != 0 && !is_blocked; t &= t - 1) {
           const auto i = static_cast<std::size_t>(std::countr_zero(t));
           if (!within(seen.ranges, i, column)) continue;
           ++counters_.exact_fallbacks;
@@ -286,7 +273,7 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
 bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupView& view, const std::uint16_t* patch,
                                   std::uint32_t leaves, bool& added) {
   const UintTag du;
-  if (!outline_.Collect(group, view)) return false;
+  if (!outline_.Collect(view)) return false;
   if (outline_.empty()) return true;
   outline_.Set();
   LineSet lines;
@@ -516,7 +503,7 @@ void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, K
   if (scratch.groups.size() < scratch.leaf.size()) scratch.groups.resize(scratch.leaf.size());
   for (GroupView& view : scratch.groups) view.known = false;
   scratch.net_edges.count = 0;
-  scratch.facing.clear();
+  scratch.facing.clear(), scratch.turning.clear();
   PacketSolver solver(scene, cluster, receivers, scratch);
   for (std::size_t i = begin; i < end; i += lanes) solver.Solve(i, std::min(lanes, end - i));
 }

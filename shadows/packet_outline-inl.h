@@ -21,8 +21,7 @@ struct OutlineEdges {
   static constexpr float kMostError = 0.02f;   // columns or rows that vertices may lie off
   std::uint32_t count = 0, fixed = 0;          // the first `fixed` are edges from `from` to `to` for all receivers
   std::uint8_t from[kMost], to[kMost];         // vertices
-  std::uint16_t positive[kMost],
-      negative[kMost];  // receivers for which others are, and for which they run against that
+  std::uint32_t turn[kMost];  // receivers for which others are (from bit 16 on), and for which they run against that
   std::uint8_t first_row[kMost], last_row[kMost];                                 // the edge crosses no others
   alignas(HWY_MAX_BYTES) float slope[kMost][kMaxLanes], width[kMost][kMaxLanes];  // columns a row; uncertainty
   std::uint64_t on_row[SampleRows::kMaxRows][kMost / 64 + 1];                     // edges that may cross the row
@@ -72,13 +71,15 @@ HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, std::size_t index, cons
   }
 }
 
+/// All receivers, as ExactScratch::facing has them.
+constexpr std::uint32_t kPositive = 0xffff0000u, kNegative = 0xffffu;
+
 /// What the receivers of a cluster have in common about a group. Its patch are the triangles that lie whole between the
 /// receivers and the light, are opaque and nobody's own. A sample is blocked by one of them where their outlines,
 /// turned alike, wind around it, and edges between two of them cancel. What is left are the net edges: fixed ones, the
 /// same for all receivers, and those of triangles that some receivers may see from above and others from below.
 HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& group, const ReceiverBox& box,
                           ExactScratch& scratch, GroupView& view) {
-  constexpr std::uint16_t kAll = 0xffff;
   const BlockerTree& tree = *scene.tree;
   const std::uint32_t first_leaf = group.first_leaf();
   const auto own_begin = std::lower_bound(scratch.own_places.begin(), scratch.own_places.end(),
@@ -86,30 +87,40 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
              own_end = std::lower_bound(own_begin, scratch.own_places.end(),
                                         (first_leaf + group.count) * BlockerTree::kWidth);
   view.is_empty = true;
+  std::vector<TurningTriangle>& turning_triangles = scratch.turning;
+  view.first_triangle = static_cast<std::uint32_t>(turning_triangles.size());
+  const std::size_t most = turning_triangles.size() + BlockerTree::kGroupSlots;
+  if (turning_triangles.capacity() < most) turning_triangles.reserve(2 * most);
   std::uint8_t turns[BlockerTree::kGroupSlots + 1];
-  std::uint16_t positive[BlockerTree::kGroupSlots + 1], negative[BlockerTree::kGroupSlots + 1];
+  std::uint32_t facing[BlockerTree::kGroupSlots + 1];
   for (std::uint32_t k = 0; k < group.count; ++k) {
     const BlockerTree::Leaf& leaf = tree.leaves[first_leaf + k];
+    const BlockerFit::Leaf& fit = scene.fit->leaves[first_leaf + k];
     LeafSides sides;
     FindSidesOfLeaf(scene, first_leaf + k, box, sides);
     std::uint32_t plain = sides.active & sides.plain & ~leaf.perforated;
     for (auto own = own_begin; own != own_end; ++own) {
       if (*own / BlockerTree::kWidth == first_leaf + k) plain &= ~(1u << *own % BlockerTree::kWidth);
     }
-    const std::uint32_t known = plain & (sides.above | sides.below);
+    const std::uint32_t known = plain & (sides.above | sides.below), turning = plain & ~known;
     view.patch[k] = static_cast<std::uint16_t>(known);
-    view.turns[k] = static_cast<std::uint16_t>(plain & ~known);
+    view.turns[k] = static_cast<std::uint16_t>(turning);
     view.single[k] = static_cast<std::uint16_t>(sides.active & ~plain);
     view.is_empty = view.is_empty && sides.active == 0;
+    const std::uint32_t samples_below = SamplesBelow(fit, box.low, box.high);
     for (std::uint32_t lane = 0; lane < BlockerTree::kWidth; ++lane) {
       const std::size_t at = BlockerTree::kWidth * k + lane;
-      positive[at] = (known & sides.above) >> lane & 1 ? kAll : 0;
-      negative[at] = (known & sides.below) >> lane & 1 ? kAll : 0;
-      turns[at] = view.turns[k] >> lane & 1;
+      facing[at] =
+          ((known & sides.above) >> lane & 1 ? kPositive : 0) | ((known & sides.below) >> lane & 1 ? kNegative : 0);
+      turns[at] = turning >> lane & 1;
+      if (turns[at] == 0) continue;
+      const BlockerPlane plane = leaf.plane_at(lane);
+      turning_triangles.push_back({leaf.corner_at(0, lane), plane.normal, plane.side_error,
+                                   static_cast<std::uint16_t>(at), (fit.samples_above >> lane & 1) != 0,
+                                   (samples_below >> lane & 1) != 0});
     }
   }
-  positive[BlockerTree::kGroupSlots] = negative[BlockerTree::kGroupSlots] = 0;
-  turns[BlockerTree::kGroupSlots] = 0;
+  facing[BlockerTree::kGroupSlots] = turns[BlockerTree::kGroupSlots] = 0;
   NetEdges& net = scratch.net_edges;
   view.first = static_cast<std::uint32_t>(net.count);
   const std::size_t wanted = net.count + 2 * group.edges + kMaxLanes;
@@ -123,10 +134,10 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
       net.end[0][axis][at] = vertices[a][axis], net.end[1][axis][at] = vertices[b][axis];
   };
   const std::span edges(tree.edges.data() + group.first_edge, group.edges);
-  const auto facing = [&](std::uint16_t t) { return (positive[t] & 1) - (negative[t] & 1); };
+  const auto side = [&](std::uint16_t t) { return (facing[t] & kPositive ? 1 : 0) - (facing[t] & kNegative ? 1 : 0); };
   for (const BlockerTree::Edge& edge : edges) {
     if (turns[edge.left] | turns[edge.right]) continue;
-    for (int c = facing(edge.left) - facing(edge.right); c != 0; c += c > 0 ? -1 : 1)
+    for (int c = side(edge.left) - side(edge.right); c != 0; c += c > 0 ? -1 : 1)
       c > 0 ? add(edge, edge.from, edge.to) : add(edge, edge.to, edge.from);
   }
   view.fixed = static_cast<std::uint32_t>(net.count) - view.first;
@@ -135,10 +146,11 @@ HWY_INLINE void ViewGroup(const ExactScene& scene, const BlockerTree::Node& grou
   }
   view.turning = static_cast<std::uint32_t>(net.count) - view.first - view.fixed;
   view.known = true;
+  view.triangles = 0;
   if (view.turning == 0) return;
+  view.triangles = static_cast<std::uint32_t>(turning_triangles.size()) - view.first_triangle;
   view.facing = static_cast<std::uint32_t>(scratch.facing.size());
-  scratch.facing.insert(scratch.facing.end(), std::begin(positive), std::end(positive));
-  scratch.facing.insert(scratch.facing.end(), std::begin(negative), std::end(negative));
+  scratch.facing.insert(scratch.facing.end(), std::begin(facing), std::end(facing));
 }
 
 /// The outline of a group's patch as a packet sees it, from net edges to lines of the picture.
@@ -148,28 +160,29 @@ class GroupOutline {
       : scene_(scene), rows_(*scene.rows), packet_(packet), scratch_(scratch) {}
 
   /// The net edges that may matter for what is open; false where they are too many.
-  bool Collect(const BlockerTree::Node& group, const GroupView& view) {
+  bool Collect(const GroupView& view) {
     edges_.count = slots_ = 0;
     ++calls_;
     const std::uint32_t turning = view.first + view.fixed;
-    if (!CollectEdges(group, view, view.first, turning, false)) return false;
+    if (!CollectEdges(view.first, turning, nullptr)) return false;
     edges_.fixed = edges_.count;
-    return view.turning == 0 || CollectEdges(group, view, turning, turning + view.turning, true);
+    return view.turning == 0 || CollectEdges(turning, turning + view.turning, scratch_.facing.data() + view.facing);
   }
+  /// For a packet anew.
+  void Begin();
   bool empty() const { return edges_.count == 0; }
   HWY_INLINE void Set();
   HWY_INLINE UintVec WindLine(std::uint32_t line, UintVec& doubtful) const;
 
  private:
-  bool CollectEdges(const BlockerTree::Node& group, const GroupView& view, std::uint32_t first, std::uint32_t end,
-                    bool turning);
+  bool CollectEdges(std::uint32_t first, std::uint32_t end, const std::uint32_t* facing);
   HWY_INLINE UintVec SamplesNearEnds(std::size_t e, Vec y, Vec offset, Vec rest) const;
   HWY_INLINE hn::Vec<IntTag> WindLeft(std::uint32_t line) const;
   template <int kBits>
   HWY_INLINE UintVec WindAround(std::uint32_t line, hn::Vec<IntTag> around, UintVec& doubtful) const;
   /// How the edge crosses a row, by receiver.
   HWY_INLINE void Turn(std::size_t e, LaneMask& down, LaneMask& up) const {
-    const LaneMask positive = LanesFromBits(edges_.positive[e], 0), negative = LanesFromBits(edges_.negative[e], 0);
+    const LaneMask positive = LanesFromBits(edges_.turn[e] >> 16, 0), negative = LanesFromBits(edges_.turn[e], 0);
     const LaneMask turned_down = hn::Or(hn::And(down, positive), hn::And(up, negative));
     up = hn::Or(hn::And(up, positive), hn::And(down, negative)), down = turned_down;
   }
@@ -184,21 +197,34 @@ class GroupOutline {
   const ExactScratch& scratch_;
   OutlineEdges edges_;
   ProjectedVertices vertices_;
-  std::uint32_t slots_ = 0;                                        // of vertices_ that are taken
-  std::uint32_t calls_ = 0;                                        // of Collect
+  vec3 middle_{0.0f};  // of the packet; its receivers lie within `reach_` of it, in the sum of |x_i|
+  float reach_ = 0.0f;
+  Vec3 from_middle_;         // to the receivers, in columns, rows and along the light's normal
+  std::uint32_t slots_ = 0;  // of vertices_ that are taken
+  std::uint32_t calls_ = 0;  // of Collect
   std::uint32_t projected_in_[3 * BlockerTree::kGroupSlots] = {};  // [vertex of a group] call that projected it,
   std::uint8_t slot_of_[3 * BlockerTree::kGroupSlots];             // and where to
 };
 
-/// Net edges that may matter for what is open: those that cross its rows and do not lie to the right of it. False where
-/// they are too many.
-bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView& view, std::uint32_t first_edge,
-                                std::uint32_t end, bool turning) {
+void GroupOutline::Begin() {
   const Tag d;
-  const hn::RebindToSigned<Tag> di;
+  middle_ = 0.5f * (packet_.low + packet_.high);
+  const vec3 half = glm::max(packet_.high - middle_, middle_ - packet_.low);
+  reach_ = (half.x + half.y + half.z) * (1.0f + 0x1p-20f);
+  const Vec3 from_middle = Subtract(packet_.position, Splat(middle_));
+  from_middle_ = {hn::Mul(Dot(from_middle, Splat(vec3(scene_.frame.u))), hn::Set(d, rows_.scale)),
+                  hn::Mul(Dot(from_middle, Splat(vec3(scene_.frame.v))), hn::Set(d, rows_.row_scale)),
+                  Dot(from_middle, Splat(vec3(scene_.frame.n)))};
+}
+
+/// Net edges that may matter for what is open: those that cross its rows and do not lie to the right of it. False where
+/// they are too many. `facing` is for edges of triangles that turn.
+bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, const std::uint32_t* facing) {
+  const Tag d;
+  const UintTag du;
+  const IntTag di;
   const LightFrame& frame = scene_.frame;
-  const vec3 middle = 0.5f * (packet_.low + packet_.high);
-  const vec3 in_frame(frame.to_frame(dvec3(middle)));
+  const vec3 in_frame(frame.to_frame(dvec3(middle_)));
   // How far the receivers reach to either side of `middle`. Not the larger of both for either side: vertices of the
   // patch lie below all receivers of the cluster, but not below more.
   float before[3], beyond[3];
@@ -208,24 +234,36 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
   }
   const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
   const NetEdges& net = scratch_.net_edges;
-  const VertexProjection projection(scene_, packet_);
-  const std::uint16_t* const positive_of = turning ? scratch_.facing.data() + view.facing : nullptr;
-  const std::uint16_t* const negative_of = turning ? positive_of + BlockerTree::kGroupSlots + 1 : nullptr;
-  const std::uint32_t in_packet = (1u << packet_.count) - 1;
+  const std::uint32_t in_packet = ((1u << packet_.count) - 1) * 0x10001u;
   const Vec row_scale = hn::Set(d, rows_.row_scale), top = hn::Set(d, static_cast<float>(rows_.rows) - 1.0f);
   constexpr float kSlack = 1e-3f;
-  const auto slot_of = [&](std::uint16_t v) {
+  const Vec height_error = hn::Add(packet_.height_error, hn::Set(d, 2.0f));
+  alignas(HWY_MAX_BYTES) float place_of[2][3][kMaxLanes], length_of[2][kMaxLanes];  // ends, from the middle
+  const auto slot_of = [&](std::size_t i, std::size_t lane, std::uint16_t v) HWY_ATTR {
     if (projected_in_[v] != calls_) {
       projected_in_[v] = calls_;
       slot_of_[v] = static_cast<std::uint8_t>(slots_);
-      projection.Project(scene_.tree->vertices[group.first_vertex + v], slots_++, vertices_);
+      // As VertexProjection, but what leads from a receiver to the end is a difference: of what leads to either from
+      // the middle. So a coordinate is within 7 (|end - middle| + |receiver - middle|) / 2^24.
+      const Vec inverse = Reciprocal(hn::Sub(from_middle_.z, hn::Set(d, place_of[i][2][lane]))),
+                scale = hn::Mul(packet_.height, inverse);
+      const Vec x = hn::Sub(hn::Set(d, place_of[i][0][lane]), from_middle_.x),
+                y = hn::Sub(hn::Set(d, place_of[i][1][lane]), from_middle_.y);
+      hn::Store(hn::MulAdd(x, scale, packet_.column), d, vertices_.column[slots_]);
+      hn::Store(hn::MulAdd(y, scale, packet_.row), d, vertices_.row[slots_]);
+      const Vec length = hn::Set(d, length_of[i][lane]);
+      const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 7.0f), length), inverse, height_error);
+      hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet_.place_error)), d,
+                vertices_.error[slots_++]);
     }
     return slot_of_[v];
   };
   for (std::uint32_t e = first_edge; e < end; e += static_cast<std::uint32_t>(hn::Lanes(d))) {
     Vec low[2] = {hn::Set(d, 1e30f), hn::Set(d, 1e30f)}, high[2] = {hn::Set(d, -1e30f), hn::Set(d, -1e30f)};
-    for (const auto& v : net.end) {
-      const Vec3 c = Subtract({hn::LoadU(d, &v[0][e]), hn::LoadU(d, &v[1][e]), hn::LoadU(d, &v[2][e])}, Splat(middle));
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Vec3 c =
+          Subtract({hn::LoadU(d, &net.end[i][0][e]), hn::LoadU(d, &net.end[i][1][e]), hn::LoadU(d, &net.end[i][2][e])},
+                   Splat(middle_));
       const Vec up = Dot(c, normal), z = hn::Add(up, hn::Set(d, in_frame.z));
       const Vec w0 = hn::Div(z, hn::Sub(hn::Neg(up), hn::Set(d, before[2]))),
                 w1 = hn::Div(z, hn::Sub(hn::Set(d, beyond[2]), up));
@@ -235,62 +273,63 @@ bool GroupOutline::CollectEdges(const BlockerTree::Node& group, const GroupView&
         const Vec a0 = hn::Mul(a, w0), a1 = hn::Mul(a, w1), b0 = hn::Mul(b, w0), b1 = hn::Mul(b, w1);
         low[axis] = hn::Min(low[axis], hn::Add(place, hn::Min(hn::Min(a0, a1), hn::Min(b0, b1))));
         high[axis] = hn::Max(high[axis], hn::Add(place, hn::Max(hn::Max(a0, a1), hn::Max(b0, b1))));
+        hn::Store(hn::Mul(away, hn::Set(d, axis == 0 ? rows_.scale : rows_.row_scale)), d, place_of[i][axis]);
       }
+      hn::Store(up, d, place_of[i][2]);
+      hn::Store(hn::Add(Norm1(c), hn::Set(d, reach_)), d, length_of[i]);
     }
     // Vertices lie off by at most OutlineEdges::kMostError columns and rows.
     const Vec pad = hn::Set(d, OutlineEdges::kMostError / std::min(rows_.scale, rows_.row_scale));
     const Rectangle& open = packet_.shaft.light;
-    const LaneMask may = hn::And(hn::And(hn::Le(hn::Sub(low[1], pad), hn::Set(d, open.high_v)),
-                                         hn::Ge(hn::Add(high[1], pad), hn::Set(d, open.low_v))),
-                                 hn::Le(hn::Sub(low[0], pad), hn::Set(d, open.high_u)));
     const std::uint64_t beside = Bits(hn::Lt(hn::Add(high[0], pad), hn::Set(d, open.low_u)));
     // Rows that may be crossed; short edges may lie between two.
-    const Vec first_row = hn::Ceil(hn::MulAdd(hn::Max(hn::Sub(low[1], pad), hn::Set(d, open.low_v)), row_scale,
-                                              hn::Set(d, rows_.least_row_offset - kSlack))),
-              last_row = hn::Floor(hn::MulAdd(hn::Min(hn::Add(high[1], pad), hn::Set(d, open.high_v)), row_scale,
-                                              hn::Set(d, rows_.most_row_offset + kSlack)));
+    const Vec first_row = hn::Max(hn::Ceil(hn::MulAdd(hn::Max(hn::Sub(low[1], pad), hn::Set(d, open.low_v)), row_scale,
+                                                      hn::Set(d, rows_.least_row_offset - kSlack))),
+                                  hn::Zero(d)),
+              last_row = hn::Min(hn::Floor(hn::MulAdd(hn::Min(hn::Add(high[1], pad), hn::Set(d, open.high_v)),
+                                                      row_scale, hn::Set(d, rows_.most_row_offset + kSlack))),
+                                 top);
+    LaneMask may = hn::And(hn::And(hn::Le(hn::Sub(low[0], pad), hn::Set(d, open.high_u)), hn::FirstN(d, end - e)),
+                           hn::Le(first_row, last_row));
+    if (hn::AllFalse(d, may)) continue;
     alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
-    hn::Store(hn::ConvertTo(di, hn::Max(first_row, hn::Zero(d))), di, first);
-    hn::Store(hn::ConvertTo(di, hn::Min(last_row, top)), di, last);
-    std::uint64_t bits = Bits(hn::And(may, hn::Le(first_row, last_row))) &
-                         ((std::uint64_t{1} << std::min<std::size_t>(hn::Lanes(d), end - e)) - 1);
-    std::uint16_t positive[kMaxLanes] = {}, negative[kMaxLanes] = {};
-    std::uint32_t twice = 0;
-    if (turning) {
-      for (std::uint64_t rest = bits; rest != 0; rest &= rest - 1) {
-        const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-        const std::uint16_t left = net.triangle[0][e + lane], right = net.triangle[1][e + lane];
-        const std::uint32_t lp = positive_of[left], ln = negative_of[left], rp = positive_of[right],
-                            rn = negative_of[right];
-        const std::uint32_t plus = (lp & ~rp) | (rn & ~ln), minus = (ln & ~rn) | (rp & ~lp);
-        positive[lane] = static_cast<std::uint16_t>(plus), negative[lane] = static_cast<std::uint16_t>(minus);
-        if (((plus | minus) & in_packet) == 0) bits &= ~(std::uint64_t{1} << lane);
-        twice |= std::uint32_t{(((lp & rn) | (ln & rp)) & in_packet) != 0} << lane;
-      }
+    alignas(HWY_MAX_BYTES) std::uint32_t turn[kMaxLanes], turn_twice[kMaxLanes];
+    std::uint64_t twice = 0;
+    if (facing != nullptr) {
+      const hn::Rebind<std::uint16_t, Tag> d16;
+      const UintVec left = hn::GatherIndex(du, facing, hn::PromoteTo(di, hn::LoadU(d16, &net.triangle[0][e]))),
+                    right = hn::GatherIndex(du, facing, hn::PromoteTo(di, hn::LoadU(d16, &net.triangle[1][e])));
+      const auto reversed = [](UintVec v) HWY_ATTR { return hn::Or(hn::ShiftLeft<16>(v), hn::ShiftRight<16>(v)); };
+      const UintVec asked = hn::Set(du, in_packet);
+      const UintVec once = hn::And(hn::Or(hn::AndNot(right, left), hn::AndNot(reversed(left), reversed(right))), asked),
+                    again = hn::And(hn::And(left, reversed(right)), asked);
+      hn::Store(once, du, turn), hn::Store(again, du, turn_twice);
+      may = hn::And(may, hn::RebindMask(d, hn::Ne(once, hn::Zero(du))));
+      twice = Bits(hn::And(may, hn::RebindMask(d, hn::Ne(again, hn::Zero(du)))));
     }
+    std::uint64_t bits = Bits(may);
     if (bits == 0) continue;
-    if (edges_.count + static_cast<std::uint32_t>(std::popcount(twice)) +
-                static_cast<std::uint32_t>(std::popcount(bits)) >
-            OutlineEdges::kMost ||
-        slots_ + 2 * static_cast<std::uint32_t>(std::popcount(bits)) > ProjectedVertices::kMost)
+    const auto count = static_cast<std::uint32_t>(std::popcount(bits));
+    if (edges_.count + static_cast<std::uint32_t>(std::popcount(twice)) + count > OutlineEdges::kMost ||
+        slots_ + 2 * count > ProjectedVertices::kMost)
       return false;
+    hn::Store(hn::ConvertTo(di, first_row), di, first), hn::Store(hn::ConvertTo(di, last_row), di, last);
     for (; bits != 0; bits &= bits - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
       const std::uint32_t i = edges_.count++;
-      edges_.from[i] = slot_of(net.vertex[0][e + lane]), edges_.to[i] = slot_of(net.vertex[1][e + lane]);
+      edges_.from[i] = slot_of(0, lane, net.vertex[0][e + lane]);
+      edges_.to[i] = slot_of(1, lane, net.vertex[1][e + lane]);
       edges_.first_row[i] = static_cast<std::uint8_t>(first[lane]);
       edges_.last_row[i] = static_cast<std::uint8_t>(last[lane]);
       edges_.left[i] = (beside >> lane & 1) != 0;
-      if (!turning) continue;
-      edges_.positive[i] = positive[lane], edges_.negative[i] = negative[lane];
+      if (facing == nullptr) continue;
+      edges_.turn[i] = turn[lane];
       if ((twice >> lane & 1) == 0) continue;
-      const std::uint16_t left = net.triangle[0][e + lane], right = net.triangle[1][e + lane];
       const std::uint32_t second = edges_.count++;
       edges_.from[second] = edges_.from[i], edges_.to[second] = edges_.to[i];
       edges_.left[second] = edges_.left[i];
       edges_.first_row[second] = edges_.first_row[i], edges_.last_row[second] = edges_.last_row[i];
-      edges_.positive[second] = static_cast<std::uint16_t>(positive_of[left] & negative_of[right]);
-      edges_.negative[second] = static_cast<std::uint16_t>(negative_of[left] & positive_of[right]);
+      edges_.turn[second] = turn_twice[lane];
     }
   }
   return true;
@@ -440,12 +479,11 @@ HWY_INLINE UintVec GroupOutline::WindAround(std::uint32_t line, hn::Vec<IntTag> 
       const Vec ya = hn::Load(d, vertices_.row[a]);
       const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
       LaneMask crossing = hn::Xor(behind, before);
-      if (e >= edges_.fixed) crossing = hn::And(crossing, LanesFromBits(edges_.positive[e] | edges_.negative[e], 0));
+      if (e >= edges_.fixed) crossing = hn::And(crossing, LanesFromBits(edges_.turn[e] >> 16 | edges_.turn[e], 0));
       if (edges_.near_row[e]) {
         UintVec near = SamplesNearEnds(e, y, offset, rest);
         if (e >= edges_.fixed) {
-          near =
-              hn::IfThenElseZero(hn::RebindMask(du, LanesFromBits(edges_.positive[e] | edges_.negative[e], 0)), near);
+          near = hn::IfThenElseZero(hn::RebindMask(du, LanesFromBits(edges_.turn[e] >> 16 | edges_.turn[e], 0)), near);
         }
         doubtful = hn::Or(doubtful, near);
       }
