@@ -28,6 +28,13 @@ void make_orthonormal(const dvec3& normal, LightSamples& samples) {
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
 }
 
+/// Rows of a disk run along `axis_u`, which make_orthonormal takes from the axes of the frame: turned by 22.6 degrees,
+/// they are not parallel to the edges of buildings, nor at 45 degrees to them.
+void turn_axes(LightSamples& samples) {
+  samples.axis_u = glm::normalize(samples.axis_u * 12.0 + samples.axis_v * 5.0);
+  samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
+}
+
 /// Unit square to unit disk, area-preserving (Shirley and Chiu 1997).
 dvec2 concentric_disk(const dvec2& st) {
   const double a = 2.0 * st.x - 1.0, b = 2.0 * st.y - 1.0;
@@ -153,6 +160,7 @@ std::vector<dvec2> pattern_samples(const PatternKey& key, std::vector<dvec2> reu
   std::vector<dvec2> st =
       unit_square_samples(key.pattern, key.count, key.frame, key.rotate ? 1 : key.sets, key.seed, std::move(reuse));
   st.resize(std::size_t{key.sets} * key.count);
+  if (key.disk) disk_rows(std::span(st).first(key.count));
   if (key.rotate) {
     for (std::size_t i = key.count; i < st.size(); ++i) st[i] = st[i - key.count];
   }
@@ -207,14 +215,21 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
   }
   samples.count = samples_of(light, config);
   const bool rotate = config.rotate_sets && (light.shape == LightShape::kDisk || light.shape == LightShape::kSphere);
-  samples.st_key = {config.pattern, samples.count, samples.sets, config.seed, config.frame, rotate};
+  const bool disk_of_rows = light.shape == LightShape::kDisk && config.pattern == SamplePattern::kRows,
+             disk = disk_of_rows && config.frame == 0 && !rotate;
+  if (disk_of_rows) turn_axes(samples);
+  samples.st_key = {config.pattern, samples.count, samples.sets, config.seed, config.frame, rotate, disk};
   samples.st =
       reuse.st_key == samples.st_key ? std::move(reuse.st) : pattern_samples(samples.st_key, emptied(reuse.st));
   for (std::size_t i = 0; i < samples.st.size(); ++i) {
     const dvec2 st = samples.st[i];
     const auto turn = rotate ? config.frame + static_cast<std::uint32_t>(i / samples.count) : 0;
-    const dvec3 offset =
-        light.shape == LightShape::kPolygon ? polygon.offset(st) : sample_offset(light, samples, st, turn);
+    dvec3 offset;
+    if (disk && i < samples.count) {
+      offset = light.radius * (samples.axis_u * (2.0 * st.x - 1.0) + samples.axis_v * (2.0 * st.y - 1.0));
+    } else {
+      offset = light.shape == LightShape::kPolygon ? polygon.offset(st) : sample_offset(light, samples, st, turn);
+    }
     samples.points.push_back(snap_to_lattice(samples.center + frame.to_local_vector(offset)));
   }
   return samples;

@@ -19,6 +19,7 @@ struct PatternKey {
   SamplePattern pattern = SamplePattern::kRows;
   std::uint32_t count = 0, sets = 0, seed = 0, frame = 0;
   bool rotate = false;  // the sets are copies of the first
+  bool disk = false;    // set 0 are rows of a disk of diameter 1 instead of the square
 
   bool operator==(const PatternKey&) const = default;
 };
@@ -28,7 +29,7 @@ struct LightSamples {
   std::uint32_t count = 0, sets = 1;
   bool interleaved = false;  // sets are chosen by place in a 4x4 pattern of pixels, not by hash
   std::vector<vec3> points;  // [set][sample]
-  std::vector<dvec2> st;     // [set][sample] in [0,1)^2, what the pattern gave; empty for explicit samples
+  std::vector<dvec2> st;     // [set][sample] in [0,1]^2, what the pattern gave; empty for explicit samples
   PatternKey st_key;         // what `st` was made of; of 0 samples where not by make_light_samples
   dvec3 center{0.0};         // local frame
   bool flat = false;         // all samples lie (up to rounding) in one plane through `center`

@@ -67,7 +67,7 @@ HWY_INLINE void FindRanges(const SampleRows& rows, const LaneRectangles& q, std:
   const Tag d;
   const IntTag di;
   constexpr float kSlack = 1e-3f;
-  const Vec least = hn::Set(d, -1.0f), most = hn::Set(d, 65.0f);
+  const Vec least = hn::Set(d, -1.0f), most = hn::Set(d, float{SampleRows::kMaxRows} + 1.0f);
   const auto whole = [&](Vec v) { return hn::ConvertTo(di, hn::Min(hn::Max(v, least), most)); };
   const Vec scale = hn::Set(d, rows.scale), row_scale = hn::Set(d, rows.row_scale);
   hn::StoreU(whole(hn::Ceil(hn::MulAdd(q.low[0], scale, hn::Set(d, rows.least_offset - kSlack)))), di,

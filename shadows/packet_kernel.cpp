@@ -78,6 +78,19 @@ class PacketSolver {
     return {receivers_.x[i], receivers_.y[i], receivers_.z[i]};
   }
 
+  std::uint8_t Set(std::size_t lane) const { return receivers_.set[packet_.first + lane]; }
+  /// The samples of a line that a receiver is asked for, by bit.
+  struct LinePoints {
+    const float *x, *y, *z;
+    vec3 operator[](std::size_t bit) const { return {x[bit], y[bit], z[bit]}; }
+  };
+  LinePoints PointsOf(std::size_t lane, std::uint32_t line) const {
+    const std::size_t padded = scene_.samples->padded;
+    return {rows_.line_points(rows_.point_x, Set(lane), line, padded),
+            rows_.line_points(rows_.point_y, Set(lane), line, padded),
+            rows_.line_points(rows_.point_z, Set(lane), line, padded)};
+  }
+
   const ExactScene& scene_;
   const SampleRows& rows_;
   const ReceiverBox& cluster_;
@@ -114,12 +127,10 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   packet_.distance =
       hn::Add(NormMax(packet_.to_center), hn::Set(d, scene_.samples->reach + rows_.deviation / kDeterminantError));
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));
-  for (std::uint32_t line = 0; line < rows_.lines; ++line) {
-    packet_.any_open[line] = rows_.valid[line];
-    hn::Store(hn::IfThenElseZero(in_packet, hn::Set(du, rows_.valid[line])), du, packet_.open[line]);
-  }
   scratch_.lines.place(*scene_.rows, receivers_.set.data() + first, count);
   packet_.lines = &scratch_.lines;
+  for (std::uint32_t line = 0; line < rows_.lines; ++line)
+    hn::Store(hn::IfThenElseZero(in_packet, hn::Set(du, rows_.valid[line])), du, packet_.open[line]);
   for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
   outline_.Begin();
   return FindOpenPart();
@@ -245,8 +256,8 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
            column <= ranges.column[1][i];
   };
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
-    const std::size_t first =
-        std::size_t{receivers_.set[packet_.first + lane]} * scene_.samples->padded + rows_.first_sample(line);
+    if (doubtful[lane] == 0) continue;
+    const LinePoints points = PointsOf(lane, line);
     for (std::uint32_t rest = doubtful[lane]; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(rest));
       const auto column = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord + bit);
@@ -260,8 +271,8 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
           const auto i = static_cast<std::size_t>(std::countr_zero(t));
           if (!within(seen.ranges, i, column)) continue;
           ++counters_.exact_fallbacks;
-          is_blocked = blocks(leaf.corner_at(0, i), leaf.corner_at(1, i), leaf.corner_at(2, i), Position(lane),
-                              scene_.samples->points[first + bit]);
+          is_blocked =
+              blocks(leaf.corner_at(0, i), leaf.corner_at(1, i), leaf.corner_at(2, i), Position(lane), points[bit]);
         }
       }
       blocked[lane] |= std::uint32_t{is_blocked} << bit;
@@ -386,18 +397,17 @@ void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, co
   const auto& [a, b, c] = triangle.corner;
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     if (possible[lane] == 0) continue;
-    const std::size_t first =
-        std::size_t{receivers_.set[packet_.first + lane]} * scene_.samples->padded + rows_.first_sample(line);
+    const LinePoints points = PointsOf(lane, line);
     for (std::uint32_t doubtful = possible[lane] & ~inside[lane]; doubtful != 0; doubtful &= doubtful - 1) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(doubtful));
       ++counters_.exact_fallbacks;
-      inside[lane] |= std::uint32_t{blocks(a, b, c, Position(lane), scene_.samples->points[first + bit])} << bit;
+      inside[lane] |= std::uint32_t{blocks(a, b, c, Position(lane), points[bit])} << bit;
     }
     if (triangle.alpha == nullptr || inside[lane] == 0) continue;
     const AlphaTriangle& alpha = *triangle.alpha;
     if (!texels_[lane]) texels_[lane].emplace(alpha, Position(lane));
-    inside[lane] = OpaqueSamples(alpha, *texels_[lane], Position(lane), &rows_.point_x[first], &rows_.point_y[first],
-                                 &rows_.point_z[first], inside[lane], counters_.exact_fallbacks);
+    inside[lane] = OpaqueSamples(alpha, *texels_[lane], Position(lane), points.x, points.y, points.z, inside[lane],
+                                 counters_.exact_fallbacks);
   }
 }
 
@@ -478,11 +488,13 @@ void PacketSolver::StoreMasks() {
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     std::uint64_t* mask = receivers_.mask(packet_.first + lane);
     for (std::uint32_t line = 0; line < rows_.lines; ++line) {
-      const std::uint64_t blocked = rows_.valid[line] & ~packet_.open[line][lane];
+      std::uint64_t blocked = rows_.valid[line] & ~packet_.open[line][lane];
       if (blocked == 0) continue;
-      const std::size_t first = rows_.first_sample(line), shift = first % 64;
-      mask[first / 64] |= blocked << shift;
-      if (shift > 32 && blocked >> (64 - shift) != 0) mask[first / 64 + 1] |= blocked >> (64 - shift);
+      const std::int32_t first = rows_.first[line];
+      if (first < 0) blocked >>= -first;  // columns before the row's first sample
+      const std::size_t at = static_cast<std::size_t>(std::max(first, 0)), shift = at % 64;
+      mask[at / 64] |= blocked << shift;
+      if (shift > 32 && blocked >> (64 - shift) != 0) mask[at / 64 + 1] |= blocked >> (64 - shift);
     }
   }
 }

@@ -24,6 +24,8 @@ std::uint32_t row_count(std::uint32_t count) {
   return root;
 }
 
+constexpr double kQuarterPi = 0.7853981633974483;  // area of a disk of diameter 1
+
 double fraction(double x) { return x - std::floor(x); }
 
 /// Shift of row `row` as a fraction of a column: a rank-1 lattice whose generator is coprime to the number of rows and
@@ -179,6 +181,42 @@ void poisson_disk_samples(std::uint32_t count, std::uint32_t first_set, std::uin
 }
 
 }  // namespace
+
+/// As many rows as columns, nearly; more where that makes a word of 32 hold a row (shadows/sample_rows.h), or two.
+std::uint32_t disk_row_count(std::uint32_t count) {
+  const auto root = static_cast<std::uint32_t>(std::sqrt(static_cast<double>(count)));
+  const auto rows_of = [&](double columns) {  // a lattice of that many columns covers one more
+    return static_cast<std::uint32_t>(std::ceil(count / (kQuarterPi * (columns - 1.0))));
+  };
+  if (10 * rows_of(32.0) <= 14 * root) return std::max({1u, root, rows_of(32.0)});
+  return std::max({1u, root, rows_of(64.0)});
+}
+
+void disk_rows(std::span<dvec2> points) {
+  const auto count = static_cast<std::uint32_t>(points.size()), rows = disk_row_count(count);
+  const auto chords = [&](std::uint32_t row) {  // of 16 heights of a row, all together
+    double sum = 0.0;
+    for (int k = 0; k < 16; ++k) {
+      const double y = (row + (k + 0.5) / 16.0) / rows;
+      sum += std::sqrt(y * (1.0 - y));
+    }
+    return sum;
+  };
+  double all = 0.0, so_far = 0.0;
+  for (std::uint32_t row = 0; row < rows; ++row) all += chords(row);
+  const double pitch = kQuarterPi * rows / count;
+  std::uint32_t next = 0;
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    so_far += chords(row);
+    const std::uint32_t first = next;
+    next = row + 1 < rows ? static_cast<std::uint32_t>(count * so_far / all + 0.5) : count;
+    if (first == next) continue;
+    const double y = (row + 0.5) / rows, reach = 0.5 * (next - first - 1.0) * pitch,
+                 room = std::max(0.0, std::sqrt(y * (1.0 - y)) - reach),
+                 shift = std::clamp(0.5 * (row_shift(row, rows) - 0.5) * pitch, -0.999 * room, 0.999 * room);
+    for (std::uint32_t i = first; i < next; ++i) points[i] = {0.5 + shift + (i - first) * pitch - reach, y};
+  }
+}
 
 std::vector<dvec2> unit_square_samples(SamplePattern pattern, std::uint32_t count, std::uint32_t first_set,
                                        std::uint32_t sets, std::uint32_t seed, std::vector<dvec2> reuse) {

@@ -2,6 +2,8 @@
 // scaling only, so that equal arguments give equal bits everywhere.
 #pragma once
 
+#include <span>
+
 #include "halfshade/shadows.h"
 
 namespace halfshade {
@@ -18,6 +20,12 @@ namespace halfshade {
 /// `count` is at most 4096. `reuse` gives its memory.
 std::vector<dvec2> unit_square_samples(SamplePattern pattern, std::uint32_t count, std::uint32_t first_set,
                                        std::uint32_t sets, std::uint32_t seed, std::vector<dvec2> reuse = {});
+
+/// Rows of a disk of diameter 1 around (1/2, 1/2), which is what SamplePattern::kRows is for disks in set 0: equally
+/// high rows whose numbers of points follow their areas, with one pitch in all rows; each off the middle by its own
+/// quarter of that at most. Fills `points`.
+void disk_rows(std::span<dvec2> points);
+std::uint32_t disk_row_count(std::uint32_t count);
 
 /// 1 for lights that have no pattern (points, explicit samples), else what `config` asks for.
 std::uint32_t number_of_sets(const Light& light, const ShadowConfig& config);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rasterizer/core/reuse.h"
+#include "shadows/sample_patterns.h"
 
 namespace halfshade {
 namespace {
@@ -13,44 +14,69 @@ SampleRows no_rows(SampleRows& rows) {
   SampleRows none;
   none.place = emptied(rows.place), none.y = emptied(rows.y), none.offset = emptied(rows.offset);
   none.point_x = emptied(rows.point_x), none.point_y = emptied(rows.point_y), none.point_z = emptied(rows.point_z);
-  none.valid = emptied(rows.valid);
+  none.valid = emptied(rows.valid), none.first = emptied(rows.first), none.runs = emptied(rows.runs);
   return none;
 }
 
-/// Samples per row if every row of every set has the same number at one height, else 0.
-std::uint32_t columns_of(const LightSamples& light) {
-  if (light.st.empty() || !light.flat || !light.outline.empty()) return 0;
+/// Rows of a rectangle: every row of every set has the same number of samples at one height.
+void find_equal_runs(const LightSamples& light, SampleRows& rows) {
   std::uint32_t columns = 1;
   while (columns < light.count && light.st[columns].y == light.st[0].y) ++columns;
-  if (light.count % columns != 0) return 0;
+  if (light.count % columns != 0) return;
   for (std::size_t i = 0; i < light.st.size(); ++i) {
-    if (light.st[i].y != light.st[i / columns * columns].y) return 0;
+    if (light.st[i].y != light.st[i / columns * columns].y) return;
   }
-  return columns;
+  rows.rows = light.count / columns;
+  for (std::uint32_t row = 0; row < rows.rows; ++row) rows.runs.push_back({row * columns, columns, 0});
+  rows.columns = columns;
+}
+
+/// Rows of a disk (disk_rows), which differ in length; of a single set.
+void find_disk_runs(const LightSamples& light, SampleRows& rows) {
+  if (light.sets != 1) return;
+  rows.rows = disk_row_count(light.count);
+  for (std::uint32_t i = 0; i < light.count; ++i) {
+    if (i == 0 || light.st[i].y != light.st[i - 1].y) rows.runs.push_back({i, 0, 0});
+    rows.columns = std::max(rows.columns, ++rows.runs.back().count);
+  }
+  for (SampleRows::Run& r : rows.runs) r.column = static_cast<std::int32_t>(rows.columns - r.count) / 2;
 }
 
 /// Row heights and shifts as the samples themselves have them: the mean of a row takes out most of their rounding.
-void add_row(std::span<const vec3> row, const KernelSamples& samples, const LightFrame& frame, SampleRows& rows) {
+void add_row(std::span<const vec3> row, std::int32_t column, const KernelSamples& samples, const LightFrame& frame,
+             SampleRows& rows) {
   dvec3 sum(0.0);
   for (const vec3& p : row) sum += frame.to_frame(dvec3(p));
   const double n = static_cast<double>(row.size());
   rows.y.push_back(static_cast<float>(sum.y / n));
-  rows.offset.push_back(static_cast<float>(0.5 * (n - 1.0) - sum.x / n * double{rows.scale}));
+  rows.offset.push_back(static_cast<float>(column + 0.5 * (n - 1.0) - sum.x / n * double{rows.scale}));
   for (std::size_t i = 0; i < row.size(); ++i) {
-    const double x = (static_cast<double>(i) - double{rows.offset.back()}) / double{rows.scale};
+    const double x = (column + static_cast<double>(i) - double{rows.offset.back()}) / double{rows.scale};
     const dvec3 place = dvec3(samples.center) + x * dvec3(rows.axis_x) + double{rows.y.back()} * dvec3(rows.axis_y);
     const dvec3 error = glm::abs(place - dvec3(row[i]));
     rows.deviation = std::max(rows.deviation, static_cast<float>(std::max({error.x, error.y, error.z}) * 1.001));
   }
 }
 
-/// The lines of a set beyond its first word of columns.
+/// The lines of a set: its words beyond the first.
 void add_further_words(SampleRows& rows) {
   const std::size_t first = rows.y.size() - rows.rows;
   for (std::uint32_t line = rows.rows; line < rows.lines; ++line) {
     const std::size_t row = first + line % rows.rows;
     rows.y.push_back(rows.y[row]);
     rows.offset.push_back(rows.offset[row] - static_cast<float>(line / rows.rows * SampleRows::kWord));
+  }
+}
+
+/// Where the samples of each line are.
+void find_lines(SampleRows& rows) {
+  constexpr auto kWord = static_cast<std::int32_t>(SampleRows::kWord);
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    const SampleRows::Run& r = rows.runs[line % rows.rows];
+    const std::int32_t first = r.column - static_cast<std::int32_t>(line / rows.rows) * kWord, low = std::max(first, 0),
+                       end = std::min(first + static_cast<std::int32_t>(r.count), kWord);
+    rows.valid.push_back(low >= end ? 0 : (~0u << low) & (~0u >> (kWord - end)));
+    rows.first.push_back(static_cast<std::int32_t>(r.first) - first);
   }
 }
 
@@ -78,37 +104,36 @@ bool space_rows(SampleRows& rows, std::uint32_t sets) {
 SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,
                             SampleRows reuse) {
   SampleRows rows = no_rows(reuse);
-  const std::uint32_t columns = columns_of(light);
-  if (columns == 0 || columns > SampleRows::kMaxColumns || light.count / columns > SampleRows::kMaxRows) return rows;
-  const std::uint32_t words = (columns + SampleRows::kWord - 1) / SampleRows::kWord;
-  rows.columns = columns;
-  rows.rows = light.count / columns;
-  rows.lines = rows.rows * words;
+  if (light.st.empty() || !light.flat || !light.outline.empty()) return rows;
+  light.st_key.disk ? find_disk_runs(light, rows) : find_equal_runs(light, rows);
+  if (rows.rows == 0 || rows.rows != rows.runs.size() || rows.rows > SampleRows::kMaxRows ||
+      rows.columns > SampleRows::kMaxColumns)
+    return no_rows(rows);
+  rows.lines = rows.rows * ((rows.columns + SampleRows::kWord - 1) / SampleRows::kWord);
   rows.axis_x = vec3(frame.u), rows.axis_y = vec3(frame.v);
-  const dvec3 first = frame.to_frame(dvec3(samples.points[0])),
-              last = frame.to_frame(dvec3(samples.points[columns - 1]));
-  const double pitch = columns > 1 ? (last.x - first.x) / (columns - 1.0) : 1.0;
+  const auto longest = std::max_element(rows.runs.begin(), rows.runs.end(),
+                                        [](const auto& a, const auto& b) { return a.count < b.count; });
+  const dvec3 first = frame.to_frame(dvec3(samples.points[longest->first])),
+              last = frame.to_frame(dvec3(samples.points[longest->first + longest->count - 1]));
+  const double pitch = longest->count > 1 ? (last.x - first.x) / (longest->count - 1.0) : 1.0;
   if (!(pitch > 1e-7)) return no_rows(rows);
   rows.scale = static_cast<float>(1.0 / pitch);
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    for (std::uint32_t row = 0; row < rows.rows; ++row) {
-      add_row(samples.set_points(set).subspan(row * columns, columns), samples, frame, rows);
-    }
+    for (const SampleRows::Run& r : rows.runs)
+      add_row(samples.set_points(set).subspan(r.first, r.count), r.column, samples, frame, rows);
     const auto offsets = std::span(rows.offset).last(rows.rows);
     const auto [least, most] = std::minmax_element(offsets.begin(), offsets.end());
     rows.least_offset = set == 0 ? *least : std::min(rows.least_offset, *least);
     rows.most_offset = set == 0 ? *most : std::max(rows.most_offset, *most);
     add_further_words(rows);
   }
+  find_lines(rows);
   if (!space_rows(rows, samples.sets)) return no_rows(rows);
+  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(SampleRows::kRoom);
   for (const vec3& p : samples.points) {
     rows.point_x.push_back(p.x), rows.point_y.push_back(p.y), rows.point_z.push_back(p.z);
   }
-  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(values->size() + 16);
-  for (std::uint32_t line = 0; line < rows.lines; ++line) {
-    const std::uint32_t left = std::min(SampleRows::kWord, columns - line / rows.rows * SampleRows::kWord);
-    rows.valid.push_back(~0u >> (SampleRows::kWord - left));
-  }
+  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(values->size() + 48);
   for (const float y : rows.y) rows.reach_y = std::max(rows.reach_y, std::fabs(y));
   // Not a rectangle's rows after all (a skewed light, rows along another axis): the general way is made for those.
   if (rows.deviation * rows.scale > 0.01f) return no_rows(rows);

@@ -6,14 +6,16 @@
 
 namespace halfshade {
 
-/// The samples of a rectangle as rows of equally spaced columns. In the light's frame (x, y along its edges, lengths of
-/// the lattice) sample i of row j lies at x = (i - offset[j]) / scale, y = y[j], up to `deviation`.
+/// The samples of a rectangle or a disk as rows of equally spaced columns. In the light's frame (x, y along its edges,
+/// lengths of the lattice) the sample in column i of row j lies at x = (i - offset[j]) / scale, y = y[j], up to
+/// `deviation`. A row need not have a sample in every column.
 ///
-/// The picture has a word of 32 columns per line. Where a row has more, it takes several lines: line b * rows + j holds
-/// the columns from 32 b on of row j, and `offset` is less by 32 b there.
+/// The picture has a word of 32 columns per line. Where there are more, a row takes several lines: line b * rows + j
+/// holds the columns from 32 b on of row j, and `offset` is less by 32 b there.
 struct SampleRows {
-  static constexpr std::uint32_t kWord = 32, kMaxColumns = 64, kMaxRows = 64;
+  static constexpr std::uint32_t kWord = 32, kMaxColumns = 64, kMaxRows = 96;
   static constexpr std::uint32_t kMaxLines = kMaxRows * (kMaxColumns / kWord);
+  static constexpr std::size_t kRoom = 32;  // of point_x, ... before the first set
   std::uint32_t rows = 0, columns = 0, lines = 0;
   vec3 axis_x{1, 0, 0}, axis_y{0, 1, 0};
   float scale = 1.0f;                             // columns per unit of length
@@ -25,16 +27,27 @@ struct SampleRows {
   float reach_y = 0.0f;                          // max |y|
   float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
   std::vector<float> y, offset;                  // [set][line]
-  std::vector<float> point_x, point_y, point_z;  // [set][KernelSamples::padded] the samples themselves, lattice; with
-                                                 // room for 16 more to be read
   std::vector<std::uint32_t> valid;              // [line]: bits of real samples
+  std::vector<std::int32_t> first;               // [line]: bit i is sample first + i of the set
+  std::vector<float> point_x, point_y, point_z;  // [set][KernelSamples::padded] the samples themselves, lattice, behind
+                                                 // kRoom others; with room for 48 more to be read
+
+  /// Consecutive samples of a set.
+  struct Run {
+    std::uint32_t first = 0, count = 0;
+    std::int32_t column = 0;  // of the first one
+  };
+  std::vector<Run> runs;  // [row]
 
   bool empty() const { return rows == 0; }
-  /// First sample of a line, within its set.
-  std::uint32_t first_sample(std::uint32_t line) const { return line % rows * columns + line / rows * kWord; }
+  /// The coordinates (one of point_x, ...) of a line's samples, by bit; `padded` is KernelSamples::padded.
+  const float* line_points(const std::vector<float>& points, std::size_t set, std::uint32_t line,
+                           std::size_t padded) const {
+    return points.data() + kRoom + set * padded + first[line];
+  }
 };
 
-/// Empty where the samples have no such rows: other shapes, patterns without rows, more than 64 columns or rows.
+/// Empty where the samples have no such rows: other shapes, patterns without rows, more columns or rows than those.
 /// `samples` must be in sample order (make_kernel_samples with SampleOrder::kAsGiven).
 /// `reuse` gives its memory.
 SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "shadows/blocker_tree.h"
+#include "shadows/exact_engine.h"
 #include "shadows/light_view.h"
 #include "support/lit_scene.h"
 
@@ -143,6 +144,32 @@ TEST_CASE("receivers in and near the light's plane, and light samples of many se
   CHECK(wrong_bits_of_exact_methods(scene_of(random_triangles(6, 300)), receivers_at(points), light, config) == 0);
 }
 
+TEST_CASE("disks of any number of samples have rows, and give the oracle's bits") {
+  Random random(7);
+  std::vector<dvec3> points;
+  for (int i = 0; i < 300; ++i)
+    points.push_back({random.uniform(-4, 4), random.uniform(-4.5, 3.5), random.uniform(-4, 4)});
+  Light light = frame_light();
+  light.shape = LightShape::kDisk, light.radius = 1.5, light.normal = {0.3, -1.0, 0.2};
+  const Scene scene = scene_of(random_triangles(8, 400));
+  for (const std::uint32_t count : {1u, 2u, 5u, 16u, 63u, 100u, 256u, 1000u, 1024u, 2500u, 4096u}) {
+    for (const std::uint32_t sets : {1u, 3u}) {
+      CAPTURE(count);
+      CAPTURE(sets);
+      ShadowConfig config = frame_config(count);
+      config.pattern = SamplePattern::kRows;
+      config.sample_sets = sets, config.frame = sets == 1 ? 0 : 9;
+      const LightSamples samples =
+          make_light_samples(light, config, make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, {}));
+      ExactLight kept;
+      prepare_exact_light(light, samples, kept);
+      CHECK((count < 16 || kept.rows.empty() == (sets > 1)));
+      CHECK(wrong_bits(solve(scene, receivers_at(points), light, config, ShadowMethod::kExact),
+                       solve(scene, receivers_at(points), light, config, ShadowMethod::kOracle)) == 0);
+    }
+  }
+}
+
 TEST_CASE(
     "outlines of a bumpy surface give the oracle's bits to receivers on it, before a light that is tilted and wide") {
   // Packets whose box reaches farther to one side of its middle than to the other: turned towards the light, the middle
@@ -173,6 +200,9 @@ TEST_CASE(
     ShadowConfig config = frame_config(64);
     config.pattern = SamplePattern::kRows;
     const Scene scene = scene_of(triangles);
+    CHECK(wrong_bits(solve(scene, receivers, light, config, ShadowMethod::kExact),
+                     solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
+    light.shape = LightShape::kDisk, light.radius = 2.4, light.normal = glm::cross(light.u, light.v);
     CHECK(wrong_bits(solve(scene, receivers, light, config, ShadowMethod::kExact),
                      solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
   }

@@ -120,6 +120,55 @@ TEST_CASE("samples lie on their light: rectangle, disk, sphere; sets differ") {
   }
 }
 
+TEST_CASE("rows of a disk: the asked number of different points in it, at one pitch, spread evenly") {
+  std::vector<std::uint32_t> counts = {512, 1000, 1024, 2048, 3217, 4096};
+  for (std::uint32_t count = 1; count <= 300; ++count) counts.push_back(count);
+  for (const std::uint32_t count : counts) {
+    CAPTURE(count);
+    std::vector<dvec2> points(count);
+    disk_rows(points);
+    double pitch = 0.0;
+    std::set<double> heights;
+    dvec2 sum(0.0);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      REQUIRE(glm::length(points[i] - 0.5) < 0.5);
+      heights.insert(points[i].y), sum += points[i] - 0.5;
+      if (i == 0) continue;
+      REQUIRE(points[i].y >= points[i - 1].y);
+      if (points[i].y != points[i - 1].y) continue;
+      const double step = points[i].x - points[i - 1].x;
+      REQUIRE(step > 0.0);
+      if (pitch == 0.0) pitch = step;
+      REQUIRE(step == doctest::Approx(pitch).epsilon(1e-9));
+    }
+    REQUIRE(heights.size() == disk_row_count(count));
+    REQUIRE(glm::length(sum) < 1.0);
+    // Half-planes hold the share of points that they hold of the disk.
+    if (count < 64) continue;
+    for (int k = 0; k < 12; ++k) {
+      const double angle = 0.26 * k, distance = 0.07 * (k % 6);  // from the middle
+      const dvec2 n(std::cos(angle), std::sin(angle));
+      const auto beyond =
+          std::count_if(points.begin(), points.end(), [&](const dvec2& p) { return glm::dot(p - 0.5, n) > distance; });
+      const double share =
+          (std::acos(2.0 * distance) - 2.0 * distance * std::sqrt(1.0 - 4.0 * distance * distance)) / 3.14159265358979;
+      CHECK(std::fabs(static_cast<double>(beyond) / count - share) < 2.0 / std::pow(count, 0.75));
+    }
+  }
+}
+
+TEST_CASE("a disk has the same set 0, whether alone or before others") {
+  Light light = frame_light();
+  light.shape = LightShape::kDisk, light.radius = 1.0;
+  const LightSamples one = samples_of(light, 100, SamplePattern::kRows),
+                     three = samples_of(light, 100, SamplePattern::kRows, 3);
+  CHECK(std::equal(one.points.begin(), one.points.end(), three.points.begin()));
+  ShadowConfig config = frame_config(100);
+  config.pattern = SamplePattern::kRows, config.frame = 2;
+  const LightSamples third = make_light_samples(light, config, unit_frame());
+  CHECK(std::equal(third.points.begin(), third.points.end(), three.points.begin() + 200));
+}
+
 TEST_CASE("degenerate lights are described, wrong ones refused with the light's name") {
   Light light = frame_light();
   light.u = dvec3(0.0);
