@@ -26,7 +26,7 @@ constexpr double kDeviations = 4.0;       // the same for samples anywhere, whos
 /// Sets of round `index`. A round costs about as much for its receivers as for its samples, so the first set is large
 /// enough for nearly all; those of each further round are twice as large until sets can be no larger.
 SetShape shape_of(std::uint32_t index, double max_error) {
-  SetShape shape{8, 32};
+  SetShape shape{16, 32};
   while (shape.size() < 4096 && (shape.size() * max_error < kSamplesPerGoal || index > 0)) {
     if (shape.size() * max_error >= kSamplesPerGoal) --index;
     shape.rows == 64 ? shape.columns = 64 : shape.rows *= 2;
