@@ -28,10 +28,10 @@ void make_orthonormal(const dvec3& normal, LightSamples& samples) {
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
 }
 
-/// Rows of a disk run along `axis_u`, which make_orthonormal takes from the axes of the frame: turned by 22.6 degrees,
-/// they are not parallel to the edges of buildings, nor at 45 degrees to them.
+/// Rows of a disk run along `axis_u`, which make_orthonormal takes from the axes of the frame: turned by 4.8 degrees,
+/// the edges of buildings cross a row or two instead of lying between two rows (docs/sampling.md).
 void turn_axes(LightSamples& samples) {
-  samples.axis_u = glm::normalize(samples.axis_u * 12.0 + samples.axis_v * 5.0);
+  samples.axis_u = glm::normalize(samples.axis_u * 12.0 + samples.axis_v);
   samples.axis_v = glm::cross(samples.axis_n, samples.axis_u);
 }
 
