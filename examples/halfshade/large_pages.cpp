@@ -1,12 +1,12 @@
-// Arrays in large pages. A picture's first touch of its memory, 4 KiB at a time, takes as long as its shadows: for
-// arrays of 2 MiB and more the system is asked for pages of that size, where it leaves the choice to programs.
+// Arrays in large pages. A picture's first touch of its memory, 4 KiB at a time, may take as long as its shadows
+// (docs/performance.md): arrays of 512 KiB and more ask for pages of 2 MiB. That is idle where all get them anyway.
+#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
 #include <sys/mman.h>
 
 #include <cstddef>
 #include <cstdlib>
 #include <new>
-
-#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
 namespace {
 
