@@ -133,12 +133,14 @@ double turn_of_set(std::uint32_t set) {
   return x - std::floor(x);
 }
 
-/// Offset from the light's centre, world units; `set` counts only where sets are rotated copies.
-dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2& st, std::uint32_t set) {
+/// Offset from the light's centre, world units; `set` counts only where sets are rotated copies. `in_disk`: `st` lies
+/// in the disk around (1/2, 1/2) already.
+dvec3 sample_offset(const Light& light, const LightSamples& samples, const dvec2& st, std::uint32_t set, bool in_disk) {
   switch (light.shape) {
     case LightShape::kRectangle:
       return light.u * (st.x - 0.5) + light.v * (st.y - 0.5);
     case LightShape::kDisk: {
+      if (in_disk) return light.radius * (samples.axis_u * (2.0 * st.x - 1.0) + samples.axis_v * (2.0 * st.y - 1.0));
       const dvec2 p = light.radius * concentric_disk(st);
       return rotated(samples.axis_u * p.x + samples.axis_v * p.y, samples.axis_n, turn_of_set(set));
     }
@@ -224,12 +226,9 @@ LightSamples make_light_samples(const Light& light, const ShadowConfig& config, 
   for (std::size_t i = 0; i < samples.st.size(); ++i) {
     const dvec2 st = samples.st[i];
     const auto turn = rotate ? config.frame + static_cast<std::uint32_t>(i / samples.count) : 0;
-    dvec3 offset;
-    if (disk && i < samples.count) {
-      offset = light.radius * (samples.axis_u * (2.0 * st.x - 1.0) + samples.axis_v * (2.0 * st.y - 1.0));
-    } else {
-      offset = light.shape == LightShape::kPolygon ? polygon.offset(st) : sample_offset(light, samples, st, turn);
-    }
+    const dvec3 offset = light.shape == LightShape::kPolygon
+                             ? polygon.offset(st)
+                             : sample_offset(light, samples, st, turn, disk && i < samples.count);
     samples.points.push_back(snap_to_lattice(samples.center + frame.to_local_vector(offset)));
   }
   return samples;

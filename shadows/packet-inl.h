@@ -48,7 +48,7 @@ struct Packet : ReceiverBox {
   std::size_t first = 0, count = 0;
   Vec3 position, to_center;       // lattice; from there to the light's centre
   Vec distance;                   // bound on |coordinate| of receiver to sample
-  Vec height_error, place_error;  // 5 |r - c| / height + 14; 5 |r - c|: see ProjectVertices
+  Vec height_error, place_error;  // 5 |r - c| / height + 14; 5 |r - c|: see PlaceVertex
   Vec column, row, height;        // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                    // own triangle
   const PictureLines* lines;      // where the rows lie
@@ -266,6 +266,22 @@ struct ProjectedVertices {
   alignas(HWY_MAX_BYTES) float column[kMost][kMaxLanes], row[kMost][kMaxLanes], error[kMost][kMaxLanes];
 };
 
+/// A vertex between the receivers and the light, by what leads to it from each of them: `x` and `y` in columns and
+/// rows, `down` against the light's normal; each within `units` length / 2^24 of the truth.
+HWY_INLINE void PlaceVertex(const Packet& packet, Vec x, Vec y, Vec down, Vec length, float units, std::size_t slot,
+                            ProjectedVertices& projected) {
+  const Tag d;
+  const Vec inverse = Reciprocal(down), scale = hn::Mul(packet.height, inverse);
+  hn::Store(hn::MulAdd(x, scale, packet.column), d, projected.column[slot]);
+  hn::Store(hn::MulAdd(y, scale, packet.row), d, projected.row[slot]);
+  // In units of 2^-24: x and y are within `units` length, the depth as well, the height within 5 |r - c|, the
+  // reciprocal within 4; the rest is rounding. Packet::height_error allows for 5 units.
+  const Vec known = hn::Add(packet.height_error, hn::Set(d, units - 5.0f));
+  const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, units), length), inverse, known);
+  hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet.place_error)), d,
+            projected.error[slot]);
+}
+
 /// Projects vertices, which must lie between the receivers and the light.
 class VertexProjection {
  public:
@@ -276,17 +292,8 @@ class VertexProjection {
         down_(Splat(vec3(-scene.frame.n))) {}
 
   HWY_INLINE void Project(const vec3& vertex, std::size_t slot, ProjectedVertices& projected) const {
-    const Tag d;
     const Vec3 way = Subtract(Splat(vertex), packet_.position);
-    const Vec inverse = Reciprocal(Dot(way, down_)), scale = hn::Mul(packet_.height, inverse);
-    hn::Store(hn::MulAdd(Dot(way, axis_x_), scale, packet_.column), d, projected.column[slot]);
-    hn::Store(hn::MulAdd(Dot(way, axis_y_), scale, packet_.row), d, projected.row[slot]);
-    // In units of 2^-24: a coordinate along an axis is within 5 |way|, the depth as well, the height within 5 |r - c|,
-    // the reciprocal within 4.
-    const Vec length = Norm1(way);
-    const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 5.0f), length), inverse, packet_.height_error);
-    hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet_.place_error)), d,
-              projected.error[slot]);
+    PlaceVertex(packet_, Dot(way, axis_x_), Dot(way, axis_y_), Dot(way, down_), Norm1(way), 5.0f, slot, projected);
   }
 
  private:

@@ -180,6 +180,8 @@ class GroupOutline {
   HWY_INLINE hn::Vec<IntTag> WindLeft(std::uint32_t line) const;
   template <int kBits>
   HWY_INLINE UintVec WindAround(std::uint32_t line, hn::Vec<IntTag> around, UintVec& doubtful) const;
+  /// For which it is an edge at all.
+  LaneMask Receivers(std::size_t e) const { return LanesFromBits(edges_.turn[e] >> 16 | edges_.turn[e], 0); }
   /// How the edge crosses a row, by receiver.
   HWY_INLINE void Turn(std::size_t e, LaneMask& down, LaneMask& up) const {
     const LaneMask positive = LanesFromBits(edges_.turn[e] >> 16, 0), negative = LanesFromBits(edges_.turn[e], 0);
@@ -199,6 +201,10 @@ class GroupOutline {
   ProjectedVertices vertices_;
   vec3 middle_{0.0f};  // of the packet; its receivers lie within `reach_` of it, in the sum of |x_i|
   float reach_ = 0.0f;
+  vec3 in_frame_{0.0f};  // the middle, in the light's frame
+  // How far the receivers reach to either side of it. Not the larger of both for either side: vertices of the patch lie
+  // below all receivers of the cluster, but not below more.
+  float before_[3] = {}, beyond_[3] = {};
   Vec3 from_middle_;         // to the receivers, in columns, rows and along the light's normal
   std::uint32_t slots_ = 0;  // of vertices_ that are taken
   std::uint32_t calls_ = 0;  // of Collect
@@ -215,6 +221,11 @@ void GroupOutline::Begin() {
   from_middle_ = {hn::Mul(Dot(from_middle, Splat(vec3(scene_.frame.u))), hn::Set(d, rows_.scale)),
                   hn::Mul(Dot(from_middle, Splat(vec3(scene_.frame.v))), hn::Set(d, rows_.row_scale)),
                   Dot(from_middle, Splat(vec3(scene_.frame.n)))};
+  in_frame_ = vec3(scene_.frame.to_frame(dvec3(middle_)));
+  for (int k = 0; k < 3; ++k) {
+    before_[k] = in_frame_[k] - packet_.shaft.low[k] + 1e-6f;
+    beyond_[k] = packet_.shaft.high[k] - in_frame_[k] + 1e-6f;
+  }
 }
 
 /// Net edges that may matter for what is open: those that cross its rows and do not lie to the right of it. False where
@@ -224,37 +235,21 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
   const UintTag du;
   const IntTag di;
   const LightFrame& frame = scene_.frame;
-  const vec3 in_frame(frame.to_frame(dvec3(middle_)));
-  // How far the receivers reach to either side of `middle`. Not the larger of both for either side: vertices of the
-  // patch lie below all receivers of the cluster, but not below more.
-  float before[3], beyond[3];
-  for (int k = 0; k < 3; ++k) {
-    before[k] = in_frame[k] - packet_.shaft.low[k] + 1e-6f;
-    beyond[k] = packet_.shaft.high[k] - in_frame[k] + 1e-6f;
-  }
   const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, normal = Splat(vec3(frame.n));
   const NetEdges& net = scratch_.net_edges;
   const std::uint32_t in_packet = ((1u << packet_.count) - 1) * 0x10001u;
   const Vec row_scale = hn::Set(d, rows_.row_scale), top = hn::Set(d, static_cast<float>(rows_.rows) - 1.0f);
   constexpr float kSlack = 1e-3f;
-  const Vec height_error = hn::Add(packet_.height_error, hn::Set(d, 2.0f));
   alignas(HWY_MAX_BYTES) float place_of[2][3][kMaxLanes], length_of[2][kMaxLanes];  // ends, from the middle
   const auto slot_of = [&](std::size_t i, std::size_t lane, std::uint16_t v) HWY_ATTR {
     if (projected_in_[v] != calls_) {
       projected_in_[v] = calls_;
       slot_of_[v] = static_cast<std::uint8_t>(slots_);
-      // As VertexProjection, but what leads from a receiver to the end is a difference: of what leads to either from
-      // the middle. So a coordinate is within 7 (|end - middle| + |receiver - middle|) / 2^24.
-      const Vec inverse = Reciprocal(hn::Sub(from_middle_.z, hn::Set(d, place_of[i][2][lane]))),
-                scale = hn::Mul(packet_.height, inverse);
-      const Vec x = hn::Sub(hn::Set(d, place_of[i][0][lane]), from_middle_.x),
-                y = hn::Sub(hn::Set(d, place_of[i][1][lane]), from_middle_.y);
-      hn::Store(hn::MulAdd(x, scale, packet_.column), d, vertices_.column[slots_]);
-      hn::Store(hn::MulAdd(y, scale, packet_.row), d, vertices_.row[slots_]);
-      const Vec length = hn::Set(d, length_of[i][lane]);
-      const Vec relative = hn::MulAdd(hn::Mul(hn::Set(d, 7.0f), length), inverse, height_error);
-      hn::Store(hn::Mul(hn::Set(d, 0x1.1p-24f), hn::MulAdd(hn::Mul(length, scale), relative, packet_.place_error)), d,
-                vertices_.error[slots_++]);
+      // What leads from a receiver to the end is a difference: of what leads to either from the middle. So it is within
+      // 7 (|end - middle| + |receiver - middle|) / 2^24.
+      const auto way = [&](int axis, Vec from) HWY_ATTR { return hn::Sub(hn::Set(d, place_of[i][axis][lane]), from); };
+      PlaceVertex(packet_, way(0, from_middle_.x), way(1, from_middle_.y), hn::Neg(way(2, from_middle_.z)),
+                  hn::Set(d, length_of[i][lane]), 7.0f, slots_++, vertices_);
     }
     return slot_of_[v];
   };
@@ -264,12 +259,12 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
       const Vec3 c =
           Subtract({hn::LoadU(d, &net.end[i][0][e]), hn::LoadU(d, &net.end[i][1][e]), hn::LoadU(d, &net.end[i][2][e])},
                    Splat(middle_));
-      const Vec up = Dot(c, normal), z = hn::Add(up, hn::Set(d, in_frame.z));
-      const Vec w0 = hn::Div(z, hn::Sub(hn::Neg(up), hn::Set(d, before[2]))),
-                w1 = hn::Div(z, hn::Sub(hn::Set(d, beyond[2]), up));
+      const Vec up = Dot(c, normal), z = hn::Add(up, hn::Set(d, in_frame_.z));
+      const Vec w0 = hn::Div(z, hn::Sub(hn::Neg(up), hn::Set(d, before_[2]))),
+                w1 = hn::Div(z, hn::Sub(hn::Set(d, beyond_[2]), up));
       for (int axis = 0; axis < 2; ++axis) {
-        const Vec away = Dot(c, axes[axis]), place = hn::Add(away, hn::Set(d, in_frame[axis]));
-        const Vec a = hn::Sub(away, hn::Set(d, beyond[axis])), b = hn::Add(away, hn::Set(d, before[axis]));
+        const Vec away = Dot(c, axes[axis]), place = hn::Add(away, hn::Set(d, in_frame_[axis]));
+        const Vec a = hn::Sub(away, hn::Set(d, beyond_[axis])), b = hn::Add(away, hn::Set(d, before_[axis]));
         const Vec a0 = hn::Mul(a, w0), a1 = hn::Mul(a, w1), b0 = hn::Mul(b, w0), b1 = hn::Mul(b, w1);
         low[axis] = hn::Min(low[axis], hn::Add(place, hn::Min(hn::Min(a0, a1), hn::Min(b0, b1))));
         high[axis] = hn::Max(high[axis], hn::Add(place, hn::Max(hn::Max(a0, a1), hn::Max(b0, b1))));
@@ -479,11 +474,11 @@ HWY_INLINE UintVec GroupOutline::WindAround(std::uint32_t line, hn::Vec<IntTag> 
       const Vec ya = hn::Load(d, vertices_.row[a]);
       const LaneMask behind = hn::Le(ya, y), before = hn::Le(hn::Load(d, vertices_.row[b]), y);
       LaneMask crossing = hn::Xor(behind, before);
-      if (e >= edges_.fixed) crossing = hn::And(crossing, LanesFromBits(edges_.turn[e] >> 16 | edges_.turn[e], 0));
+      if (e >= edges_.fixed) crossing = hn::And(crossing, Receivers(e));
       if (edges_.near_row[e]) {
         UintVec near = SamplesNearEnds(e, y, offset, rest);
         if (e >= edges_.fixed) {
-          near = hn::IfThenElseZero(hn::RebindMask(du, LanesFromBits(edges_.turn[e] >> 16 | edges_.turn[e], 0)), near);
+          near = hn::IfThenElseZero(hn::RebindMask(du, Receivers(e)), near);
         }
         doubtful = hn::Or(doubtful, near);
       }
