@@ -1,6 +1,5 @@
-// What the exact engine does for every kind of sample arrangement, per instruction set: the cluster's shaft against the
-// tree of blockers, and 16 triangles of a leaf against one receiver up to their bounding rectangles on the light.
-// Included once per Highway target by exact_kernel.cpp (samples anywhere) and packet_kernel.cpp (samples in rows).
+// The shaft from a cluster of receivers to the light against the tree of blockers, per instruction set. Included once per
+// Highway target by packet_kernel.cpp.
 
 #if defined(HALFSHADE_EXACT_CLUSTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_EXACT_CLUSTER_INL_H_
@@ -69,11 +68,10 @@ HWY_INLINE LaneMask MeetsShaft(const Shaft& s, const float* const low[3], const 
   return meets;
 }
 
-/// Leaves or, where `kGroups`, groups (nodes) whose box meets the cluster's shaft, into scratch.leaf.
-template <bool kGroups>
-HWY_INLINE void CollectLeaves(const BlockerFit& fit, const Shaft& shaft, ExactScratch& scratch) {
+/// Groups whose box meets the cluster's shaft, into scratch.group.
+HWY_INLINE void CollectGroups(const BlockerFit& fit, const Shaft& shaft, ExactScratch& scratch) {
   const std::size_t lanes = hn::Lanes(Tag());
-  scratch.leaf.clear();
+  scratch.group.clear();
   for (int k = 0; k < 3; ++k) scratch.low[k].clear(), scratch.high[k].clear();
   scratch.stack.assign(1, 0);
   while (!scratch.stack.empty()) {
@@ -85,13 +83,12 @@ HWY_INLINE void CollectLeaves(const BlockerFit& fit, const Shaft& shaft, ExactSc
       for (std::uint64_t bits = Bits(MeetsShaft(shaft, low, high, i)); bits != 0; bits &= bits - 1) {
         const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
         if (at >= node.count) continue;
-        const std::uint32_t child = node.child[at] & ~BlockerTree::kLeafBit;
-        const bool is_leaf = child != node.child[at];
-        if (!is_leaf && !(kGroups && fit.nodes[child].is_group)) {
+        const std::uint32_t child = node.child[at];
+        if (!fit.nodes[child].is_group) {
           scratch.stack.push_back(child);
           continue;
         }
-        scratch.leaf.push_back(child);
+        scratch.group.push_back(child);
         for (int k = 0; k < 3; ++k) {
           scratch.low[k].push_back(node.low[k][at]);
           scratch.high[k].push_back(node.high[k][at]);
@@ -102,8 +99,8 @@ HWY_INLINE void CollectLeaves(const BlockerFit& fit, const Shaft& shaft, ExactSc
 }
 
 /// Largest share of the light first: what hides much is tested before what hides little.
-HWY_INLINE void SortLeaves(const Shaft& shaft, ExactScratch& scratch) {
-  const std::size_t count = scratch.leaf.size();
+HWY_INLINE void SortGroups(const Shaft& shaft, ExactScratch& scratch) {
+  const std::size_t count = scratch.group.size();
   scratch.keys.clear();
   const float r[3] = {0.5f * (shaft.low[0] + shaft.high[0]), 0.5f * (shaft.low[1] + shaft.high[1]),
                       0.5f * (shaft.low[2] + shaft.high[2])};
@@ -125,7 +122,7 @@ HWY_INLINE void SortLeaves(const Shaft& shaft, ExactScratch& scratch) {
     old = values;
     for (std::size_t i = 0; i < count; ++i) values[i] = old[scratch.keys[i].second];
   };
-  reorder(scratch.leaf, scratch.old_leaf);
+  reorder(scratch.group, scratch.old_group);
   for (int k = 0; k < 3; ++k) {
     reorder(scratch.low[k], scratch.old_bound), reorder(scratch.high[k], scratch.old_bound);
     scratch.low[k].resize(count + kMaxLanes, 1e30f);  // padding: boxes that no shaft meets
@@ -141,92 +138,9 @@ HWY_INLINE LaneMask LanesFromBits(std::uint32_t bits, std::size_t first) {
   return hn::LoadMaskBits(d, bytes);
 }
 
-HWY_INLINE bool OutsideBox(const vec3& p, const BlockerFit::Leaf& leaf) {
-  return p.x < leaf.box_low.x || p.y < leaf.box_low.y || p.z < leaf.box_low.z || p.x > leaf.box_high.x ||
-         p.y > leaf.box_high.y || p.z > leaf.box_high.z;
-}
-
-/// Lanes of a leaf that could hide something from a receiver: not its own triangle, facing so that some sample lies on
-/// the other side of the plane. Fills what `pairs` needs for the edges later; returns the lanes as bits.
-HWY_INLINE std::uint64_t FacingLanes(const BlockerTree::Leaf& leaf, const BlockerFit::Leaf& fit, std::size_t i,
-                                     const vec3& position, std::uint32_t own, PairLanes& pairs,
-                                     std::array<Vec3, 3>& corner) {
-  const Tag d;
-  const UintTag du;
-  const Vec3 r = Splat(position);
-  const std::uint32_t no_front = OutsideBox(position, fit) ? fit.back_faces_only : 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    corner[k] = {hn::LoadU(d, leaf.corner[k][0] + i), hn::LoadU(d, leaf.corner[k][1] + i),
-                 hn::LoadU(d, leaf.corner[k][2] + i)};
-    pairs.to_corner[k] = Subtract(corner[k], r);
-  }
-  const Vec3 normal{hn::LoadU(d, leaf.normal[0] + i), hn::LoadU(d, leaf.normal[1] + i),
-                    hn::LoadU(d, leaf.normal[2] + i)};
-  const Vec side = Dot(normal, pairs.to_corner[0]);
-  const Vec side_error = hn::Mul(hn::LoadU(d, leaf.side_error + i), Norm1(pairs.to_corner[0]));
-  const LaneMask above = hn::Gt(side, side_error);
-  pairs.below = hn::Lt(side, hn::Neg(side_error));
-  pairs.unknown = hn::Not(hn::Or(above, pairs.below));
-  const LaneMask facing =
-      hn::Or(pairs.unknown, hn::Or(hn::And(above, LanesFromBits(fit.samples_above, i)),
-                                   hn::And(pairs.below, LanesFromBits(fit.samples_below & ~no_front, i))));
-  const auto other = hn::Ne(hn::LoadU(du, leaf.triangle + i), hn::Set(du, own));
-  pairs.active = hn::And(hn::And(hn::FirstN(d, leaf.count - i), facing), hn::RebindMask(d, other));
-  return Bits(pairs.active);
-}
-
-/// Edges, and the way from the receiver to the light, of the lanes that FacingLanes set up.
-HWY_INLINE void SetEdges(const KernelSamples& samples, const vec3& position, const std::array<Vec3, 3>& corner,
-                         PairLanes& pairs) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    pairs.edge[k] = Subtract(corner[(k + 1) % 3], corner[k]);
-    pairs.edge_error[k] = hn::Mul(hn::Set(Tag(), kDeterminantError), Norm1(pairs.edge[k]));
-  }
-  pairs.to_center = Subtract(Splat(samples.center), Splat(position));
-  pairs.distance = hn::Add(NormMax(pairs.to_center), hn::Set(Tag(), samples.reach));
-}
-
-/// Bounding rectangles of the lanes' triangles, projected onto the light's plane and widened for rounding. A triangle
-/// that reaches the receiver's height has no bounded projection.
-struct ProjectedLanes : LaneRectangles {
-  LaneMask bounded;
-};
-
-/// The way to a corner is within 5 units of 2^-24 of its length, and so is its height, by which the projection divides.
-/// Corners that project farther than 4 from the receiver may err by more: they still lie beyond every light.
-HWY_INLINE ProjectedLanes ProjectTriangles(const LightFrame& frame, const std::array<Vec3, 3>& to_corner,
-                                           const Shaft& receiver) {
-  const Tag d;
-  const float r[3] = {receiver.low[0], receiver.low[1], receiver.low[2]};
-  const Vec3 axes[2] = {Splat(vec3(frame.u)), Splat(vec3(frame.v))}, down = Splat(vec3(-frame.n));
-  ProjectedLanes p;
-  p.low[0] = p.low[1] = hn::Set(d, 1e30f);
-  p.high[0] = p.high[1] = hn::Set(d, -1e30f);
-  Vec least = hn::Set(d, 1e30f), farthest = hn::Zero(d);  // height below the receiver; length of the way
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec below = Dot(to_corner[k], down);
-    least = hn::Min(least, below);
-    farthest = hn::Max(farthest, Norm1(to_corner[k]));
-    const Vec scale = hn::Div(hn::Set(d, r[2]), below);
-    for (int axis = 0; axis < 2; ++axis) {
-      const Vec q = hn::MulAdd(Dot(to_corner[k], axes[axis]), scale, hn::Set(d, r[axis]));
-      p.low[axis] = hn::Min(p.low[axis], q);
-      p.high[axis] = hn::Max(p.high[axis], q);
-    }
-  }
-  const Vec magnified = hn::Div(hn::Mul(farthest, hn::Set(d, 1e-6f * (r[2] + 4.0f))), least);
-  const Vec pad = hn::Add(magnified, hn::Set(d, ProjectionPad(r[2])));
-  p.bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
-  for (int axis = 0; axis < 2; ++axis) {
-    p.low[axis] = hn::Sub(p.low[axis], pad), p.high[axis] = hn::Add(p.high[axis], pad);
-  }
-  return p;
-}
-
-/// Leaves (groups) that the shaft of receivers [begin, end) meets, what hides most first; false where there are none
-/// and all of the receivers are lit.
-template <bool kGroups>
-HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size_t end,
+/// Groups that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
+/// the receivers are lit.
+HWY_INLINE bool ListGroups(const ExactScene& scene, std::size_t begin, std::size_t end,
                            const KernelReceivers& receivers, ExactScratch& scratch) {
   Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};
   for (std::size_t i = begin; i < end; ++i) {
@@ -234,16 +148,16 @@ HWY_INLINE bool ListLeaves(const ExactScene& scene, std::size_t begin, std::size
     for (int k = 0; k < 3; ++k)
       shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
   }
-  const vec2 low = scene.rectangles->whole_low, high = scene.rectangles->whole_high;
+  const vec3 low = scene.rows->low, high = scene.rows->high;
   const float pad = ProjectionPad(shaft.low[2]);
   shaft.light = {low.x - pad, low.y - pad, high.x + pad, high.y + pad};
-  CollectLeaves<kGroups>(*scene.fit, shaft, scratch);
-  scratch.leaves_listed += scratch.leaf.size();
-  if (scratch.leaf.empty()) {
+  CollectGroups(*scene.fit, shaft, scratch);
+  scratch.leaves_listed += scratch.group.size();
+  if (scratch.group.empty()) {
     ++scratch.clusters_lit;
     return false;
   }
-  SortLeaves(shaft, scratch);
+  SortGroups(shaft, scratch);
   return true;
 }
 

@@ -27,70 +27,6 @@ void order_receivers(const ReceiverArray& receivers, const LightFrame& frame, Ex
       work.curve, work.order);
 }
 
-/// One set into its bins: counted, then placed in order.
-void fill_bins(const KernelSamples& samples, const LightFrame& frame, std::uint32_t set, SampleRectangles& r) {
-  constexpr std::uint32_t kBins = SampleRectangles::kBins;
-  const std::size_t first = std::size_t{set} * samples.padded, before = r.binned.size();
-  std::array<std::uint32_t, kBins * kBins + 1> begin{};
-  for (std::uint32_t i = 0; i < samples.count; ++i) {
-    const dvec2 p(frame.to_frame(dvec3(samples.points[first + i])));
-    const dvec2 place = (p - dvec2(r.bins_low)) * dvec2(r.bins_per_unit);
-    const auto column = static_cast<std::uint32_t>(std::clamp(place.x, 0.0, kBins - 1.0));
-    const auto row = static_cast<std::uint32_t>(std::clamp(place.y, 0.0, kBins - 1.0));
-    r.occupied[set][row] |= 1u << column;
-    r.bin_of_sample[first + i] = static_cast<std::uint16_t>(row * kBins + column);
-    ++begin[row * kBins + column + 1];
-  }
-  for (std::size_t bin = 1; bin < begin.size(); ++bin) begin[bin] += begin[bin - 1];
-  for (const std::uint32_t b : begin) r.bin_begin.push_back(static_cast<std::uint32_t>(before) + b);
-  r.binned.resize(before + samples.count);
-  for (std::uint32_t i = 0; i < samples.count; ++i) {
-    r.binned[before + begin[r.bin_of_sample[first + i]]++] = static_cast<std::uint16_t>(i);
-  }
-}
-
-/// Bins over the bounding rectangle of all sets.
-void sort_into_bins(const KernelSamples& samples, const LightFrame& frame, SampleRectangles& r) {
-  dvec2 low(HUGE_VAL), high(-HUGE_VAL);
-  for (const vec3& p : samples.points) {
-    const dvec2 q(frame.to_frame(dvec3(p)));
-    low = glm::min(low, q), high = glm::max(high, q);
-  }
-  r.bins_low = vec2(low);
-  r.bins_per_unit = vec2(double{SampleRectangles::kBins} / glm::max(high - low, dvec2(1e-12)));
-  r.occupied.assign(samples.sets, {});
-  r.bin_of_sample.assign(samples.points.size(), 0);
-  for (std::uint32_t set = 0; set < samples.sets; ++set) fill_bins(samples, frame, set, r);
-}
-
-SampleRectangles make_rectangles(const KernelSamples& samples, const LightFrame& frame, SampleRectangles reuse) {
-  SampleRectangles r;
-  r.low_u = emptied(reuse.low_u), r.low_v = emptied(reuse.low_v);
-  r.high_u = emptied(reuse.high_u), r.high_v = emptied(reuse.high_v);
-  r.occupied = emptied(reuse.occupied), r.bin_of_sample = emptied(reuse.bin_of_sample);
-  r.bin_begin = emptied(reuse.bin_begin), r.binned = emptied(reuse.binned);
-  const std::size_t count = samples.group_x.size(), groups = samples.padded / KernelSamples::kGroup;
-  r.low_u.assign(count, 0.0f), r.low_v.assign(count, 0.0f), r.high_u.assign(count, 0.0f), r.high_v.assign(count, 0.0f);
-  for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    for (std::size_t g = 0; g < groups; ++g) {
-      dvec3 low(HUGE_VAL), high(-HUGE_VAL);
-      for (const vec3& p : samples.set_points(set).subspan(g * KernelSamples::kGroup, KernelSamples::kGroup)) {
-        const dvec3 q = frame.to_frame(dvec3(p));
-        low = glm::min(low, q), high = glm::max(high, q);
-      }
-      const std::size_t at = std::size_t{set} * samples.group_stride + g;
-      r.low_u[at] = static_cast<float>(low.x - 1e-7), r.high_u[at] = static_cast<float>(high.x + 1e-7);
-      r.low_v[at] = static_cast<float>(low.y - 1e-7), r.high_v[at] = static_cast<float>(high.y + 1e-7);
-      r.whole_low = glm::min(r.whole_low, vec2(r.low_u[at], r.low_v[at]));
-      r.whole_high = glm::max(r.whole_high, vec2(r.high_u[at], r.high_v[at]));
-      r.thickness = std::max({r.thickness, static_cast<float>(-low.z), static_cast<float>(high.z)});
-    }
-  }
-  r.thickness += 1e-7f;
-  sort_into_bins(samples, frame, r);
-  return r;
-}
-
 void add_counters(const ScratchPool& scratches, ShadowStats& stats) {
   KernelCounters total;
   for (const auto& s : scratches.all()) {
@@ -135,24 +71,18 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   if (order.empty()) return;
   KernelReceivers& kernel = work.receivers;
   const KernelSamples& samples = kept.samples;
-  const SampleRows& rows = kept.rows;
-  if (rows.empty()) {
-    gather_receivers(receivers, order, masks.words_per_receiver, kernel);
-  } else {  // bits are in the order of the samples: no masks but the caller's
-    gather_receivers(receivers, order, 0, kernel);
-    kernel.words = masks.words_per_receiver;
-    kernel.mask_at.resize(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
-  }
+  gather_receivers(receivers, order, 0, kernel);  // no masks but the caller's
+  kernel.words = masks.words_per_receiver;
+  kernel.mask_at.resize(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
   stats.index_ms += watch.lap();
   fit_side(blockers, samples, frame, side);
   stats.cull_ms += watch.lap();
-  const ExactScene scene{blockers.tree, &side.fit, &samples, &kept.rectangles, &rows, frame};
-  const auto solve = rows.empty() ? solve_cluster : solve_packets;
+  const ExactScene scene{blockers.tree, &side.fit, &samples, &kept.rows, frame};
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   const std::size_t nodes = blockers.tree->nodes.size();
-  work.scratches.start(concurrency(), nodes, rows.empty() ? blockers.tree->leaves.size() : nodes);
+  work.scratches.start(concurrency(), nodes);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
@@ -160,14 +90,13 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
       const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
       for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
         check_run();
-        solve(scene, begin, std::min(task_end, begin + kCluster), kernel, *scratch);
+        solve_packets(scene, begin, std::min(task_end, begin + kCluster), kernel, *scratch);
       }
     });
   }
-  if (rows.empty()) scatter_masks(kernel, samples, order, masks);
   add_counters(work.scratches, stats);
   stats.bytes = std::max<std::uint64_t>(
-      stats.bytes, blockers.tree->bytes() + side.fit.bytes() + kernel.x.size() * 21 + kernel.masks.size() * 8);
+      stats.bytes, blockers.tree->bytes() + side.fit.bytes() + kernel.x.size() * 21);
   stats.test_ms += watch.lap();
 }
 
@@ -193,9 +122,9 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 }  // namespace
 
-void ScratchPool::start(std::size_t threads, std::size_t nodes, std::size_t listed) {
+void ScratchPool::start(std::size_t threads, std::size_t nodes) {
   while (scratches_.size() < threads) scratches_.push_back(std::make_unique<ExactScratch>());
-  const std::size_t leaves = listed + KernelReceivers::kLanePadding;
+  const std::size_t groups = nodes + KernelReceivers::kLanePadding;
   std::size_t edges = 0, facing = 0, turning = 0;
   for (const auto& s : scratches_) {
     facing = std::max(facing, s->facing.capacity());
@@ -204,11 +133,11 @@ void ScratchPool::start(std::size_t threads, std::size_t nodes, std::size_t list
   }
   free_.clear();
   for (const auto& s : scratches_) {
-    s->stack.reserve(nodes), s->leaf.reserve(leaves), s->keys.reserve(leaves);
+    s->stack.reserve(nodes), s->group.reserve(groups), s->keys.reserve(groups);
     s->groups.reserve(nodes), s->own_places.reserve(kCluster), s->net_edges.reserve(edges);
     s->facing.reserve(facing), s->turning.reserve(turning);
-    s->old_leaf.reserve(leaves), s->old_bound.reserve(leaves);
-    for (int k = 0; k < 3; ++k) s->low[k].reserve(leaves), s->high[k].reserve(leaves);
+    s->old_group.reserve(groups), s->old_bound.reserve(groups);
+    for (int k = 0; k < 3; ++k) s->low[k].reserve(groups), s->high[k].reserve(groups);
     s->lines.placed = PictureLines::kNothing;
     s->counters = {};
     s->leaves_listed = s->leaves_tested = s->clusters_lit = 0;
@@ -249,14 +178,9 @@ void prepare_exact_light(const Light& light, const LightSamples& samples, ExactL
 }
 
 void prepare_exact_samples(const LightSamples& samples, ExactLight& kept) {
-  const auto samples_in = [&](SampleOrder order) {
-    kept.samples = make_kernel_samples(samples, kept.bound, order, std::move(kept.samples));
-  };
   kept.front = {dvec3(kept.bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
-  samples_in(SampleOrder::kAsGiven);
+  kept.samples = make_kernel_samples(samples, kept.bound, SampleOrder::kAsGiven, std::move(kept.samples));
   kept.rows = find_sample_rows(samples, kept.samples, kept.front, std::move(kept.rows));
-  if (kept.rows.empty()) samples_in(SampleOrder::kNeighboursTogether);
-  kept.rectangles = make_rectangles(kept.samples, kept.front, std::move(kept.rectangles));
 }
 
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,

@@ -2,8 +2,8 @@
 //
 // The methods of the papers loop over triangles and pay for every (blocker, receiver) pair; tracing rays loops over
 // samples and pays for every one. Here neighbouring receivers form clusters; a cluster collects the leaves that its
-// shaft to the light meets; each receiver tests them near ones first, 16 triangles at a time against the part of the
-// light that nothing has blocked yet, and stops when there is none.
+// shaft to the light meets; packets of receivers test them, what hides most first, against the part of the light that
+// nothing has blocked yet, and stop when there is none.
 #pragma once
 
 #include <memory>
@@ -35,8 +35,7 @@ struct ExactLight {
   LightBound bound;
   LightFrame front;
   KernelSamples samples;
-  SampleRows rows;              // empty: samples anywhere
-  SampleRectangles rectangles;  // the same from both sides
+  SampleRows rows;
   std::array<ExactSide, 2> sides;
 
   /// The blockers are others, or moved.
@@ -46,9 +45,9 @@ struct ExactLight {
 /// One for each thread at work, kept from call to call.
 class ScratchPool {
  public:
-  /// Room for so many threads, for a tree of so many nodes, and for lists of so many of its leaves (groups); nothing is
-  /// left of earlier calls but memory, the same for all: which cluster meets which scratch changes from call to call.
-  void start(std::size_t threads, std::size_t nodes, std::size_t listed);
+  /// Room for so many threads and for a tree of so many nodes; nothing is left of earlier calls but memory, the same for
+  /// all: which cluster meets which scratch changes from call to call.
+  void start(std::size_t threads, std::size_t nodes);
   ExactScratch& take();
   void give(ExactScratch& scratch);
   const std::vector<std::unique_ptr<ExactScratch>>& all() const { return scratches_; }

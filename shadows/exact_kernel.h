@@ -1,30 +1,15 @@
-// Hot loop of the exact engine: one cluster of receivers against a tree of blockers.
+// Hot loop of the exact engine: one cluster of receivers against a tree of blockers (packet_kernel.cpp).
 #pragma once
 
 #include "shadows/sample_rows.h"
 
 namespace halfshade {
 
-/// The samples seen from the front: groups as rectangles in the light's plane, [set][KernelSamples::group_stride],
-/// padded outwards; and all samples sorted into 32 x 32 bins.
-struct SampleRectangles {
-  static constexpr std::uint32_t kBins = 32;
-  std::vector<float> low_u, low_v, high_u, high_v;
-  vec2 whole_low{1e30f}, whole_high{-1e30f};  // around all groups of all sets
-  float thickness = 0.0f;                     // the samples lie within this distance of the plane
-  vec2 bins_low{0.0f}, bins_per_unit{0.0f};
-  std::vector<std::array<std::uint32_t, kBins>> occupied;  // [set][row]: bit c is set where bin (row, c) holds a sample
-  std::vector<std::uint16_t> bin_of_sample;                // [set][KernelSamples::padded], row * 32 + column
-  std::vector<std::uint32_t> bin_begin;                    // [set][bin + 1] into binned
-  std::vector<std::uint16_t> binned;                       // samples (kernel order), bin by bin
-};
-
 struct ExactScene {
   const BlockerTree* tree = nullptr;
   const BlockerFit* fit = nullptr;  // of the tree, to the samples
   const KernelSamples* samples = nullptr;
-  const SampleRectangles* rectangles = nullptr;
-  const SampleRows* rows = nullptr;  // where the samples have rows
+  const SampleRows* rows = nullptr;
   LightFrame frame;
 };
 
@@ -38,6 +23,22 @@ struct PictureLines {
 
   /// For receivers of these sets; lanes beyond `count` are like the last.
   void place(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
+};
+
+/// Where samples anywhere lie in the pictures of a packet, by SampleRows' arrays of a set.
+struct PlacedSamples {
+  struct alignas(64) Place {
+    float column[PictureLines::kLanes], row[PictureLines::kLanes];
+  };
+  struct Bounds {
+    float low_column, high_column, low_row, high_row;
+  };
+  const float *column = nullptr, *row = nullptr;  // of all receivers; or null, and:
+  std::vector<Place> place;
+  std::vector<Bounds> bounds;  // over all receivers
+
+  /// For receivers of these sets; lanes beyond `count` are like the last.
+  void set(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
 };
 
 /// What a cluster of receivers sees of a group (packet_kernel.cpp).
@@ -82,12 +83,13 @@ struct TurningTriangle {
 /// Scratch of one thread, and what it counted.
 struct ExactScratch {
   PictureLines lines;
-  std::vector<std::uint32_t> stack, leaf;             // node stack; collected leaves
+  PlacedSamples places;
+  std::vector<std::uint32_t> stack, group;            // node stack; collected groups
   std::vector<float> low[3], high[3];                 // their boxes, light frame, padded to full vectors
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
-  std::vector<std::uint32_t> old_leaf;                // what is being sorted
+  std::vector<std::uint32_t> old_group;               // what is being sorted
   std::vector<float> old_bound;
-  std::vector<GroupView> groups;          // of the groups listed in `leaf`
+  std::vector<GroupView> groups;          // of those listed in `group`
   std::vector<std::uint32_t> own_places;  // BlockerTree::place of the receivers' own triangles
   NetEdges net_edges;
   std::vector<TurningTriangle> turning;
@@ -99,11 +101,8 @@ struct ExactScratch {
   std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0;
 };
 
-/// Solves receivers [begin, end), which should lie near each other. All in front of the light (z > 0 in its frame).
-void solve_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
-                   ExactScratch& scratch);
-
-/// The same for samples in rows (scene.rows), which must be in sample order.
+/// Solves receivers [begin, end), which should lie near each other. All in front of the light (z > 0 in its frame);
+/// samples must be in sample order.
 void solve_packets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                    ExactScratch& scratch);
 

@@ -51,7 +51,8 @@ struct Packet : ReceiverBox {
   Vec height_error, place_error;  // 5 |r - c| / height + 14; 5 |r - c|: see PlaceVertex
   Vec column, row, height;        // of the receivers over the picture, in columns and rows from its centre; in lengths
   UintVec own;                    // own triangle
-  const PictureLines* lines;      // where the rows lie
+  const PictureLines* lines;      // where the rows lie; samples anywhere:
+  const PlacedSamples* places;
   float open_low[2], open_high[2];    // columns and rows from the centre between which lies what some receiver has open
   std::uint32_t any_open[kMaxLines];  // what some receiver has open
   alignas(HWY_MAX_BYTES) std::uint32_t open[kMaxLines][kMaxLanes];  // bit i: sample i of the line is not blocked yet
@@ -96,20 +97,22 @@ struct PictureRange {
     return first > last ? 0 : (~0u << first) & (~0u >> (31 - last));
   }
 
-  /// visit(line) for the lines in which some receiver has a sample of the range open, until it returns true.
+  /// visit(line, samples that some receiver has open) for the lines in which the range holds such, until it returns
+  /// true.
   template <class Visit>
   HWY_INLINE bool for_open_lines(const SampleRows& rows, const Packet& packet, const Visit& visit) const {
     for (std::uint32_t from = 0, line = 0; from < rows.columns; from += SampleRows::kWord, line += rows.rows) {
       const std::uint32_t wanted = bits(static_cast<std::int32_t>(from));
       for (std::int32_t row = first_row; row <= last_row; ++row) {
         const std::uint32_t at = line + static_cast<std::uint32_t>(row);
-        if ((packet.any_open[at] & wanted) != 0 && visit(at)) return true;
+        const std::uint32_t open = packet.any_open[at] & wanted;
+        if (open != 0 && visit(at, open)) return true;
       }
     }
     return false;
   }
   HWY_INLINE bool is_open(const SampleRows& rows, const Packet& packet) const {
-    return for_open_lines(rows, packet, [](std::uint32_t) { return true; });
+    return for_open_lines(rows, packet, [](std::uint32_t, std::uint32_t) { return true; });
   }
 };
 
@@ -361,7 +364,7 @@ HWY_INLINE LaneMask ReceiversOverOpenSamples(const SampleRows& rows, const std::
                                    hn::Set(d, 31.5f - rows.most_offset + from - column_pad));
   }
   LaneMask receivers = hn::Lt(low, low);
-  range.for_open_lines(rows, packet, [&](std::uint32_t line) HWY_ATTR {
+  range.for_open_lines(rows, packet, [&](std::uint32_t line, std::uint32_t) HWY_ATTR {
     const Vec row = hn::Set(d, static_cast<float>(line % rows.rows));
     const UintVec open = hn::And(hn::Load(du, packet.open[line]), columns[line / rows.rows]);
     const LaneMask here =

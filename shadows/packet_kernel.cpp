@@ -1,6 +1,6 @@
-// The exact engine for samples in rows: a packet of receivers, one in each vector lane, sees the light as a picture of
-// rows, and triangles are rasterized into all of the packet's pictures at once. Samples too near to an edge for the
-// error bounds go to the exact predicate.
+// The exact engine: a packet of receivers, one in each vector lane, sees the light as a picture of rows of samples, and
+// triangles are rasterized into all of the packet's pictures at once. Samples too near to an edge for the error bounds
+// go to the exact predicate.
 //
 // What is decided once for the whole packet: which leaves, which of a leaf's triangles (16 at a time), which rows.
 #include <optional>
@@ -12,8 +12,7 @@
 #include <hwy/foreach_target.h>
 
 #include "shadows/alpha_lookup-inl.h"
-#include "shadows/packet_outline-inl.h"
-#include "shadows/packet_triangle-inl.h"
+#include "shadows/packet_anywhere-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace halfshade {
@@ -38,11 +37,11 @@ class PacketSolver {
     const float* const high[3] = {scratch_.high[0].data(), scratch_.high[1].data(), scratch_.high[2].data()};
     bool any = false;
     PictureRanges ranges;
-    for (std::size_t i = 0; i < scratch_.leaf.size(); i += lanes) {
+    for (std::size_t i = 0; i < scratch_.group.size(); i += lanes) {
       for (std::uint64_t bits = BoxesOverOpenSamples(rows_, low, high, i, packet_, 0, ranges); bits != 0;
            bits &= bits - 1) {
         const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
-        if (!RasterizeGroup(scene_.fit->nodes[scratch_.leaf[at]], scratch_.groups[at])) continue;
+        if (!RasterizeGroup(scene_.fit->nodes[scratch_.group[at]], scratch_.groups[at])) continue;
         any = true;
         if (!FindOpenPart()) {
           StoreMasks();
@@ -67,9 +66,14 @@ class PacketSolver {
   bool RasterizeTriangle(std::size_t leaf, const LeafView& view, std::size_t lane);
   void StoreMasks();
 
+  HWY_INLINE UintVec WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const;
+  HWY_INLINE UintVec TestSamples(const TriangleAnywhere& triangle, const PictureRange& range, std::uint32_t line,
+                                 UintVec& inside) const;
   HWY_INLINE void SetPlanes(PacketTriangle& triangle) const;
-  HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const LineSet& lines);
-  HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const LineSet& lines, LaneMask below, LaneMask active);
+  HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range,
+                                const LineSet& lines);
+  HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
+                            LaneMask below, LaneMask active);
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
   void Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible, std::uint32_t* inside);
 
@@ -85,10 +89,8 @@ class PacketSolver {
     vec3 operator[](std::size_t bit) const { return {x[bit], y[bit], z[bit]}; }
   };
   LinePoints PointsOf(std::size_t lane, std::uint32_t line) const {
-    const std::size_t padded = scene_.samples->padded;
-    return {rows_.line_points(rows_.point_x, Set(lane), line, padded),
-            rows_.line_points(rows_.point_y, Set(lane), line, padded),
-            rows_.line_points(rows_.point_z, Set(lane), line, padded)};
+    return {rows_.line_points(rows_.point_x, Set(lane), line), rows_.line_points(rows_.point_y, Set(lane), line),
+            rows_.line_points(rows_.point_z, Set(lane), line)};
   }
 
   const ExactScene& scene_;
@@ -127,8 +129,12 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   packet_.distance =
       hn::Add(NormMax(packet_.to_center), hn::Set(d, scene_.samples->reach + rows_.deviation / kDeterminantError));
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));
-  scratch_.lines.place(*scene_.rows, receivers_.set.data() + first, count);
-  packet_.lines = &scratch_.lines;
+  if (rows_.anywhere) {
+    scratch_.places.set(rows_, receivers_.set.data() + first, count);
+  } else {
+    scratch_.lines.place(rows_, receivers_.set.data() + first, count);
+  }
+  packet_.lines = &scratch_.lines, packet_.places = &scratch_.places;
   for (std::uint32_t line = 0; line < rows_.lines; ++line)
     hn::Store(hn::IfThenElseZero(in_packet, hn::Set(du, rows_.valid[line])), du, packet_.open[line]);
   for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
@@ -182,7 +188,7 @@ bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& vie
   int in_patch = 0;
   for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1)
     in_patch += std::popcount(patch[std::countr_zero(rest)]);
-  const bool patched = !rows_.place.empty() && in_patch >= 3 && RasterizePatch(group, view, patch, leaves, added);
+  const bool patched = rows_.has_outlines() && in_patch >= 3 && RasterizePatch(group, view, patch, leaves, added);
   for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) {
     const auto k = static_cast<std::uint32_t>(std::countr_zero(rest));
     std::uint32_t wanted = view.patch[k] | view.turns[k] | view.single[k];
@@ -280,18 +286,36 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
   }
 }
 
+/// `asked` samples of a line as WindLine gives them.
+HWY_INLINE UintVec PacketSolver::WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const {
+  const UintTag du;
+  UintVec blocked = hn::Zero(du);
+  doubtful = blocked;
+  for (; asked != 0; asked &= asked - 1) {
+    const UintVec bit = hn::Set(du, asked & (0u - asked));
+    LaneMask unsure;
+    const LaneMask hidden = outline_.WindSample(
+        line * SampleRows::kWord + static_cast<std::size_t>(std::countr_zero(asked)), unsure);
+    blocked = hn::Or(blocked, hn::IfThenElseZero(hn::RebindMask(du, hidden), bit));
+    doubtful = hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure), bit));
+  }
+  return blocked;
+}
+
 /// The group's patch into all pictures; false where its triangles must be taken one by one.
 bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupView& view, const std::uint16_t* patch,
                                   std::uint32_t leaves, bool& added) {
   const UintTag du;
   if (!outline_.Collect(view)) return false;
   if (outline_.empty()) return true;
-  outline_.Set();
+  rows_.anywhere ? outline_.SetAnywhere() : outline_.Set();
   LineSet lines;
+  std::uint32_t asked[kMaxLines];  // of samples anywhere: those that the patch may hide
   for (std::uint32_t rest = leaves; rest != 0; rest &= rest - 1) {
     const auto k = static_cast<std::size_t>(std::countr_zero(rest));
     if (patch[k] == 0) continue;
-    PictureRange(rows_, leaf_ranges_, k).for_open_lines(rows_, packet_, [&](std::uint32_t line) {
+    PictureRange(rows_, leaf_ranges_, k).for_open_lines(rows_, packet_, [&](std::uint32_t line, std::uint32_t open) {
+      asked[line] = lines.has(line) ? asked[line] | open : open;
       lines.add(line);
       return false;
     });
@@ -302,7 +326,8 @@ bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupVie
     const UintVec open = hn::Load(du, packet_.open[line]);
     UintVec doubtful;
     ++counters_.sample_tests;
-    UintVec blocked = hn::And(outline_.WindLine(line, doubtful), open);
+    UintVec blocked = rows_.anywhere ? WindSamples(line, asked[line], doubtful) : outline_.WindLine(line, doubtful);
+    blocked = hn::And(blocked, open);
     doubtful = hn::And(doubtful, open);
     if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
       alignas(HWY_MAX_BYTES) std::uint32_t in_doubt[kMaxLanes], does[kMaxLanes];
@@ -351,9 +376,29 @@ HWY_INLINE std::array<LaneMask, 4> PacketSolver::Orient(const PacketTriangle& tr
   return up;
 }
 
+/// Of a line's samples that are in the range and open to somebody, those that may be inside the triangle, and those that
+/// certainly are.
+HWY_INLINE UintVec PacketSolver::TestSamples(const TriangleAnywhere& triangle, const PictureRange& range,
+                                             std::uint32_t line, UintVec& inside) const {
+  const UintTag du;
+  UintVec possible = hn::Zero(du);
+  inside = possible;
+  const auto from = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord);
+  for (std::uint32_t asked = range.bits(from) & packet_.any_open[line]; asked != 0; asked &= asked - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(asked));
+    const UintVec bit = hn::Set(du, 1u << i);
+    LaneMask may, is;
+    triangle.Test(SamplePlace(*packet_.places, line * SampleRows::kWord + i), may, is);
+    possible = hn::Or(possible, hn::IfThenElseZero(hn::RebindMask(du, may), bit));
+    inside = hn::Or(inside, hn::IfThenElseZero(hn::RebindMask(du, is), bit));
+  }
+  return possible;
+}
+
 /// The lanes whose receiver lies above the plane, along the normal ("the plane is below it"). Takes those for which the
 /// triangle hides nothing out of `active`.
-HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, LaneMask& active, const LineSet& lines) {
+HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range,
+                                            const LineSet& lines) {
   const Tag d;
   const BlockerPlane& plane = triangle.plane;
   const Vec3 to_corner = Subtract(Splat(triangle.corner[0]), packet_.position);
@@ -368,12 +413,16 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
     for (const LaneMask turned : {none, hn::Not(none)}) {
       const std::array<LaneMask, 4> up = Orient(triangle, turned);
       const Outline outline(triangle, up, Bits(unknown));
+      const TriangleAnywhere anywhere(rows_, triangle, up);
       lines.for_each([&](std::uint32_t line) HWY_ATTR {
         const UintTag du;
         const PictureLines& l = *packet_.lines;
-        const UintVec possible =
-            hn::And(outline.possible(hn::Load(d, l.y[line]), hn::Load(d, l.offset[line]), hn::Load(d, l.rest[line])),
-                    hn::Load(du, packet_.open[line]));
+        UintVec inside;
+        const UintVec possible = hn::And(rows_.anywhere ? TestSamples(anywhere, range, line, inside)
+                                                        : outline.possible(hn::Load(d, l.y[line]),
+                                                                           hn::Load(d, l.offset[line]),
+                                                                           hn::Load(d, l.rest[line])),
+                                         hn::Load(du, packet_.open[line]));
         matters = hn::Or(matters, hn::RebindMask(d, hn::Ne(possible, hn::Zero(du))));
       });
     }
@@ -411,22 +460,25 @@ void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, co
   }
 }
 
-HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const LineSet& lines, LaneMask below,
-                                        LaneMask active) {
+HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
+                                        LaneMask below, LaneMask active) {
   const Tag d;
   const UintTag du;
   const std::array<LaneMask, 4> up = Orient(triangle, below);
   const Outline outline(triangle, up, Bits(active));
+  const TriangleAnywhere anywhere(rows_, triangle, up);
   const auto wanted = hn::VecFromMask(du, hn::RebindMask(du, active));
   bool added = false;
   lines.for_each([&](std::uint32_t line) HWY_ATTR {
     const PictureLines& l = *packet_.lines;
     const Vec y = hn::Load(d, l.y[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
     const UintVec open = hn::Load(du, packet_.open[line]), asked = hn::And(open, wanted);
-    const UintVec possible = hn::And(asked, outline.possible(y, offset, rest));
+    UintVec inside;
+    const UintVec possible = hn::And(asked, rows_.anywhere ? TestSamples(anywhere, range, line, inside)
+                                                           : outline.possible(y, offset, rest));
     ++counters_.sample_tests;
     if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return;
-    UintVec inside = hn::And(asked, outline.inside(y, offset, rest));
+    inside = hn::And(asked, rows_.anywhere ? inside : outline.inside(y, offset, rest));
     if (triangle.alpha != nullptr || !hn::AllTrue(du, hn::Eq(possible, inside))) {
       alignas(HWY_MAX_BYTES) std::uint32_t may[kMaxLanes], does[kMaxLanes];
       hn::Store(possible, du, may), hn::Store(inside, du, does);
@@ -458,7 +510,7 @@ bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, st
   } else {
     active = hn::And(active, ReceiversBelow(rows_, scene_.frame, leaf, lane, packet_));
     if (hn::AllFalse(d, active)) return false;
-    range.for_open_lines(rows_, packet_, [&](std::uint32_t line) {
+    range.for_open_lines(rows_, packet_, [&](std::uint32_t line, std::uint32_t) {
       lines.add(line);
       return false;
     });
@@ -475,11 +527,11 @@ bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, st
   const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
   LaneMask is_below = below ? hn::Not(none) : none;
   if (!above && !below) {
-    is_below = FindBelow(triangle, active, lines);
+    is_below = FindBelow(triangle, active, range, lines);
     if (hn::AllFalse(d, active)) return false;
   }
   ++counters_.pairs_sampled;
-  if (!Rasterize(triangle, lines, is_below, active)) return false;
+  if (!Rasterize(triangle, range, lines, is_below, active)) return false;
   ++counters_.pairs_necessary;
   return true;
 }
@@ -490,6 +542,14 @@ void PacketSolver::StoreMasks() {
     for (std::uint32_t line = 0; line < rows_.lines; ++line) {
       std::uint64_t blocked = rows_.valid[line] & ~packet_.open[line][lane];
       if (blocked == 0) continue;
+      if (rows_.anywhere) {
+        const std::uint16_t* const sample = rows_.sample_of.data() + Set(lane) * rows_.stride + line * SampleRows::kWord;
+        for (; blocked != 0; blocked &= blocked - 1) {
+          const std::uint16_t s = sample[std::countr_zero(blocked)];
+          mask[s / 64] |= std::uint64_t{1} << s % 64;
+        }
+        continue;
+      }
       const std::int32_t first = rows_.first[line];
       if (first < 0) blocked >>= -first;  // columns before the row's first sample
       const std::size_t at = static_cast<std::size_t>(std::max(first, 0)), shift = at % 64;
@@ -501,7 +561,7 @@ void PacketSolver::StoreMasks() {
 
 void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                   ExactScratch& scratch) {
-  if (!ListLeaves<true>(scene, begin, end, receivers, scratch)) return;
+  if (!ListGroups(scene, begin, end, receivers, scratch)) return;
   const std::size_t lanes = hn::Lanes(Tag());
   ReceiverBox cluster;
   scratch.own_places.clear();
@@ -512,7 +572,7 @@ void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, K
       scratch.own_places.push_back(place[receivers.own[i]]);
   }
   std::sort(scratch.own_places.begin(), scratch.own_places.end());
-  if (scratch.groups.size() < scratch.leaf.size()) scratch.groups.resize(scratch.leaf.size());
+  if (scratch.groups.size() < scratch.group.size()) scratch.groups.resize(scratch.group.size());
   for (GroupView& view : scratch.groups) view.known = false;
   scratch.net_edges.count = 0;
   scratch.facing.clear(), scratch.turning.clear();
@@ -538,6 +598,29 @@ void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::s
     }
   }
   placed = alike ? set[0] : kMixed;
+}
+
+void PlacedSamples::set(const SampleRows& rows, const std::uint8_t* set, std::size_t count) {
+  column = row = nullptr;
+  if (std::all_of(set, set + count, [&](std::uint8_t s) { return s == set[0]; })) {
+    column = rows.column_of.data() + std::size_t{set[0]} * rows.stride;
+    row = rows.row_of.data() + std::size_t{set[0]} * rows.stride;
+    return;
+  }
+  place.resize(rows.stride), bounds.resize(rows.stride);
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    const std::uint32_t end = line * SampleRows::kWord + static_cast<std::uint32_t>(std::bit_width(rows.valid[line]));
+    for (std::uint32_t at = line * SampleRows::kWord; at < end; ++at) {
+      Bounds b{1e30f, -1e30f, 1e30f, -1e30f};
+      for (std::size_t lane = 0; lane < PictureLines::kLanes; ++lane) {
+        const std::size_t from = std::size_t{set[std::min(lane, count - 1)]} * rows.stride + at;
+        const float x = rows.column_of[from], y = rows.row_of[from];
+        place[at].column[lane] = x, place[at].row[lane] = y;
+        b = {std::min(b.low_column, x), std::max(b.high_column, x), std::min(b.low_row, y), std::max(b.high_row, y)};
+      }
+      bounds[at] = b;
+    }
+  }
 }
 
 HWY_EXPORT(SolvePackets);

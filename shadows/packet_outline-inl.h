@@ -29,6 +29,13 @@ struct OutlineEdges {
                            [kMost / 64 + 1];  // the same, of edges to the left of all that is open
   bool left[kMost];
   bool near_row[kMost];  // an end of the edge lies on a row for some receiver, so far as can be told
+  // For samples anywhere: boxes around edges over all receivers, in columns and rows, as many as fill a vector.
+  struct Boxes {
+    alignas(HWY_MAX_BYTES) float low[kMost + 1], high[kMost + 1];
+  };
+  Boxes columns, rows;
+  // The column where the edge is at its first end, by receiver; rows between which it may pass near to a sample.
+  alignas(HWY_MAX_BYTES) float column[kMost][kMaxLanes], near_low[kMost][kMaxLanes], near_high[kMost][kMaxLanes];
 };
 
 /// Triangles of one leaf of a group, as bits, as seen by a box of receivers.
@@ -66,7 +73,7 @@ HWY_INLINE void FindSidesOfLeaf(const ExactScene& scene, std::size_t index, cons
     const LaneMask bounded = hn::Gt(least, hn::Mul(farthest, hn::Set(d, 1e-5f)));
     const Vec magnified = hn::Mul(farthest, hn::Set(d, 1e-6f * (box.shaft.high[2] + 4.0f)));
     const LaneMask good = hn::Le(magnified, hn::Mul(least, hn::Set(d, most - ProjectionPad(box.shaft.low[2]))));
-    const LaneMask before_light = hn::Gt(lowest, hn::Set(d, 1e-4f + scene.rectangles->thickness));
+    const LaneMask before_light = hn::Gt(lowest, hn::Set(d, 1e-4f + std::max(scene.rows->high.z, -scene.rows->low.z)));
     sides.plain |= static_cast<std::uint32_t>(Bits(hn::And(hn::And(bounded, good), before_light))) << i;
   }
 }
@@ -173,6 +180,9 @@ class GroupOutline {
   bool empty() const { return edges_.count == 0; }
   HWY_INLINE void Set();
   HWY_INLINE UintVec WindLine(std::uint32_t line, UintVec& doubtful) const;
+  // For samples anywhere (packet_anywhere-inl.h).
+  HWY_INLINE void SetAnywhere();
+  HWY_INLINE LaneMask WindSample(std::size_t at, LaneMask& doubtful) const;
 
  private:
   bool CollectEdges(std::uint32_t first, std::uint32_t end, const std::uint32_t* facing);
@@ -289,6 +299,7 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
     if (hn::AllFalse(d, may)) continue;
     alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
     alignas(HWY_MAX_BYTES) std::uint32_t turn[kMaxLanes], turn_twice[kMaxLanes];
+    alignas(HWY_MAX_BYTES) float box[2][2][kMaxLanes];
     std::uint64_t twice = 0;
     if (facing != nullptr) {
       const hn::Rebind<std::uint16_t, Tag> d16;
@@ -309,6 +320,19 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
         slots_ + 2 * count > ProjectedVertices::kMost)
       return false;
     hn::Store(hn::ConvertTo(di, first_row), di, first), hn::Store(hn::ConvertTo(di, last_row), di, last);
+    if (rows_.anywhere) {
+      const Vec around = hn::Add(pad, hn::Set(d, rows_.deviation));
+      for (int axis = 0; axis < 2; ++axis) {
+        const Vec scale = axis == 0 ? hn::Set(d, rows_.scale) : row_scale;
+        hn::Store(hn::MulAdd(hn::Sub(low[axis], around), scale, hn::Set(d, -kSlack)), d, box[axis][0]);
+        hn::Store(hn::MulAdd(hn::Add(high[axis], around), scale, hn::Set(d, kSlack)), d, box[axis][1]);
+      }
+    }
+    const auto set_box = [&](std::uint32_t i, std::size_t lane) {
+      if (!rows_.anywhere) return;
+      edges_.columns.low[i] = box[0][0][lane], edges_.columns.high[i] = box[0][1][lane];
+      edges_.rows.low[i] = box[1][0][lane], edges_.rows.high[i] = box[1][1][lane];
+    };
     for (; bits != 0; bits &= bits - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
       const std::uint32_t i = edges_.count++;
@@ -317,6 +341,7 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
       edges_.first_row[i] = static_cast<std::uint8_t>(first[lane]);
       edges_.last_row[i] = static_cast<std::uint8_t>(last[lane]);
       edges_.left[i] = (beside >> lane & 1) != 0;
+      set_box(i, lane);
       if (facing == nullptr) continue;
       edges_.turn[i] = turn[lane];
       if ((twice >> lane & 1) == 0) continue;
@@ -325,6 +350,7 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
       edges_.left[second] = edges_.left[i];
       edges_.first_row[second] = edges_.first_row[i], edges_.last_row[second] = edges_.last_row[i];
       edges_.turn[second] = turn_twice[lane];
+      set_box(second, lane);
     }
   }
   return true;

@@ -1,7 +1,9 @@
 #include "shadows/sample_rows.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 
 #include "rasterizer/core/reuse.h"
 #include "shadows/sample_patterns.h"
@@ -10,11 +12,14 @@ namespace halfshade {
 namespace {
 
 /// No rows, and the memory of those that there were.
-SampleRows no_rows(SampleRows& rows) {
+SampleRows no_rows(SampleRows& rows, const LightFrame& frame) {
   SampleRows none;
+  none.axis_x = vec3(frame.u), none.axis_y = vec3(frame.v);
   none.place = emptied(rows.place), none.y = emptied(rows.y), none.offset = emptied(rows.offset);
   none.point_x = emptied(rows.point_x), none.point_y = emptied(rows.point_y), none.point_z = emptied(rows.point_z);
   none.valid = emptied(rows.valid), none.first = emptied(rows.first), none.runs = emptied(rows.runs);
+  none.column_of = emptied(rows.column_of), none.row_of = emptied(rows.row_of);
+  none.sample_of = emptied(rows.sample_of);
   return none;
 }
 
@@ -99,24 +104,31 @@ bool space_rows(SampleRows& rows, std::uint32_t sets) {
   return most - least < 2.0;
 }
 
-}  // namespace
+/// Points of the lattice line by line, with room on both sides for what reads whole vectors.
+template <class Point>
+void store_points(std::size_t count, const Point& point, SampleRows& rows) {
+  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(SampleRows::kRoom);
+  for (std::size_t i = 0; i < count; ++i) {
+    const vec3& p = point(i);
+    rows.point_x.push_back(p.x), rows.point_y.push_back(p.y), rows.point_z.push_back(p.z);
+  }
+  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(values->size() + 48);
+}
 
-SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,
-                            SampleRows reuse) {
-  SampleRows rows = no_rows(reuse);
-  if (light.st.empty() || !light.flat || !light.outline.empty()) return rows;
+/// The rows that the samples form; false where they form none.
+bool find_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame, SampleRows& rows) {
+  if (light.st.empty() || !light.outline.empty()) return false;
   light.st_key.disk ? find_disk_runs(light, rows) : find_equal_runs(light, rows);
   if (rows.rows == 0 || rows.rows != rows.runs.size() || rows.rows > SampleRows::kMaxRows ||
       rows.columns > SampleRows::kMaxColumns)
-    return no_rows(rows);
+    return false;
   rows.lines = rows.rows * ((rows.columns + SampleRows::kWord - 1) / SampleRows::kWord);
-  rows.axis_x = vec3(frame.u), rows.axis_y = vec3(frame.v);
   const auto longest = std::max_element(rows.runs.begin(), rows.runs.end(),
                                         [](const auto& a, const auto& b) { return a.count < b.count; });
   const dvec3 first = frame.to_frame(dvec3(samples.points[longest->first])),
               last = frame.to_frame(dvec3(samples.points[longest->first + longest->count - 1]));
   const double pitch = longest->count > 1 ? (last.x - first.x) / (longest->count - 1.0) : 1.0;
-  if (!(pitch > 1e-7)) return no_rows(rows);
+  if (!(pitch > 1e-7)) return false;
   rows.scale = static_cast<float>(1.0 / pitch);
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
     for (const SampleRows::Run& r : rows.runs)
@@ -128,15 +140,105 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
     add_further_words(rows);
   }
   find_lines(rows);
-  if (!space_rows(rows, samples.sets)) return no_rows(rows);
-  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(SampleRows::kRoom);
-  for (const vec3& p : samples.points) {
-    rows.point_x.push_back(p.x), rows.point_y.push_back(p.y), rows.point_z.push_back(p.z);
-  }
-  for (auto* values : {&rows.point_x, &rows.point_y, &rows.point_z}) values->resize(values->size() + 48);
+  if (!space_rows(rows, samples.sets)) return false;
+  rows.stride = samples.padded;
+  store_points(samples.points.size(), [&](std::size_t i) { return samples.points[i]; }, rows);
   for (const float y : rows.y) rows.reach_y = std::max(rows.reach_y, std::fabs(y));
-  // Not a rectangle's rows after all (a skewed light, rows along another axis): the general way is made for those.
-  if (rows.deviation * rows.scale > 0.01f) return no_rows(rows);
+  // Not a rectangle's rows after all (a skewed light, rows along another axis): those are samples anywhere.
+  return rows.deviation * rows.scale <= 0.01f;
+}
+
+/// Rows of about as many samples as there are rows, a word each where that is possible.
+void divide_into_rows(std::uint32_t count, SampleRows& rows) {
+  constexpr std::uint32_t kWord = SampleRows::kWord;
+  rows.rows = static_cast<std::uint32_t>(std::ceil(std::sqrt(static_cast<double>(count))));
+  if ((count + kWord - 1) / kWord <= SampleRows::kMaxRows) rows.rows = std::max(rows.rows, (count + kWord - 1) / kWord);
+  for (std::uint32_t row = 0; row < rows.rows; ++row) {
+    const std::uint32_t first = row * count / rows.rows, end = (row + 1) * count / rows.rows;
+    rows.runs.push_back({first, end - first, 0});
+    rows.columns = std::max(rows.columns, end - first);
+  }
+  rows.lines = rows.rows * ((rows.columns + kWord - 1) / kWord);
+  rows.stride = rows.lines * kWord;
+}
+
+/// Columns or rows per unit of length; not so many for small lights that nothing would be known to the nearest one.
+float cells_per_length(std::uint32_t cells, double length) {
+  constexpr double kMost = 1000.0;
+  return static_cast<float>(std::min(cells / std::max(length, 1e-9), kMost));
+}
+
+/// One set into the lines.
+void sort_set(const KernelSamples& samples, std::uint32_t set, std::span<const dvec3> place, SampleRows& rows) {
+  std::array<std::uint16_t, SampleRows::kMaxLines * SampleRows::kWord> order;
+  const auto end = order.begin() + samples.count;
+  std::iota(order.begin(), end, std::uint16_t{0});
+  std::sort(order.begin(), end, [&](auto a, auto b) { return place[a].y < place[b].y; });
+  const std::size_t begin = std::size_t{set} * rows.stride;
+  for (std::uint32_t row = 0; row < rows.rows; ++row) {
+    const SampleRows::Run& r = rows.runs[row];
+    std::sort(order.begin() + r.first, order.begin() + r.first + r.count,
+              [&](auto a, auto b) { return place[a].x < place[b].x; });
+    for (std::uint32_t i = 0; i < r.count; ++i) {
+      const std::uint16_t sample = order[r.first + i];
+      const std::uint32_t line = i / SampleRows::kWord * rows.rows + row;
+      const std::size_t at = begin + line * SampleRows::kWord + i % SampleRows::kWord;
+      const dvec2 p = dvec2(place[sample]) * dvec2(rows.scale, rows.row_scale);
+      rows.sample_of[at] = sample;
+      rows.column_of[at] = static_cast<float>(p.x), rows.row_of[at] = static_cast<float>(p.y);
+      rows.least_offset = std::min(rows.least_offset, static_cast<float>(i - p.x));
+      rows.most_offset = std::max(rows.most_offset, static_cast<float>(i - p.x));
+      rows.least_row_offset = std::min(rows.least_row_offset, static_cast<float>(row - p.y));
+      rows.most_row_offset = std::max(rows.most_row_offset, static_cast<float>(row - p.y));
+      const dvec3 error = glm::abs(dvec3(samples.center) +
+                                   double{rows.column_of[at]} / double{rows.scale} * dvec3(rows.axis_x) +
+                                   double{rows.row_of[at]} / double{rows.row_scale} * dvec3(rows.axis_y) -
+                                   dvec3(samples.set_points(set)[sample]));
+      rows.deviation = std::max(rows.deviation, static_cast<float>(std::max({error.x, error.y, error.z}) * 1.001));
+    }
+  }
+}
+
+void sort_samples(const KernelSamples& samples, const LightFrame& frame, SampleRows& rows) {
+  rows.anywhere = true;
+  divide_into_rows(samples.count, rows);
+  std::vector<dvec3> place;
+  dvec3 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const vec3& p : samples.points) {
+    place.push_back(frame.to_frame(dvec3(p)));
+    low = glm::min(low, place.back()), high = glm::max(high, place.back());
+  }
+  rows.scale = cells_per_length(rows.columns, high.x - low.x);
+  rows.row_scale = cells_per_length(rows.rows, high.y - low.y);
+  rows.reach_y = static_cast<float>(std::max(std::fabs(low.y), std::fabs(high.y)));
+  rows.least_offset = rows.least_row_offset = 1e30f, rows.most_offset = rows.most_row_offset = -1e30f;
+  const std::size_t size = std::size_t{samples.sets} * rows.stride;
+  rows.sample_of.assign(size, 0), rows.column_of.assign(size, 0.0f), rows.row_of.assign(size, 0.0f);
+  for (std::uint32_t set = 0; set < samples.sets; ++set)
+    sort_set(samples, set, std::span(place).subspan(std::size_t{set} * samples.padded, samples.padded), rows);
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    const std::uint32_t from = line / rows.rows * SampleRows::kWord, count = rows.runs[line % rows.rows].count;
+    rows.valid.push_back(count <= from ? 0 : ~0u >> (SampleRows::kWord - std::min(count - from, SampleRows::kWord)));
+    rows.first.push_back(static_cast<std::int32_t>(line * SampleRows::kWord));
+  }
+  store_points(size, [&](std::size_t i) {
+    return samples.set_points(static_cast<std::uint32_t>(i / rows.stride))[rows.sample_of[i]];
+  }, rows);
+}
+
+}  // namespace
+
+SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,
+                            SampleRows reuse) {
+  SampleRows rows = no_rows(reuse, frame);
+  if (!find_rows(light, samples, frame, rows)) {
+    rows = no_rows(rows, frame);
+    sort_samples(samples, frame, rows);
+  }
+  for (const vec3& p : samples.points) {
+    const vec3 place(frame.to_frame(dvec3(p)));
+    rows.low = glm::min(rows.low, place - 1e-6f), rows.high = glm::max(rows.high, place + 1e-6f);
+  }
   return rows;
 }
 

@@ -12,12 +12,16 @@ namespace halfshade {
 ///
 /// The picture has a word of 32 columns per line. Where there are more, a row takes several lines: line b * rows + j
 /// holds the columns from 32 b on of row j, and `offset` is less by 32 b there.
+///
+/// Samples anywhere are sorted into rows by y and within each by x. A column is a rank then; the offsets still bound how
+/// far it lies off the samples' places, and these are kept one by one.
 struct SampleRows {
   static constexpr std::uint32_t kWord = 32, kMaxColumns = 64, kMaxRows = 96;
   static constexpr std::uint32_t kMaxLines = kMaxRows * (kMaxColumns / kWord);
   static constexpr std::size_t kRoom = 32;  // of point_x, ... before the first set
   std::uint32_t rows = 0, columns = 0, lines = 0;
   vec3 axis_x{1, 0, 0}, axis_y{0, 1, 0};
+  vec3 low{1e30f}, high{-1e30f};  // around the samples of all sets in the light's frame, rounded outwards
   float scale = 1.0f;                             // columns per unit of length
   float least_offset = 0.0f, most_offset = 0.0f;  // over all rows (not lines)
   /// Row j lies between (j - most_row_offset) / row_scale and (j - least_row_offset) / row_scale, in all sets.
@@ -26,11 +30,15 @@ struct SampleRows {
   std::vector<float> place;
   float reach_y = 0.0f;                          // max |y|
   float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
-  std::vector<float> y, offset;                  // [set][line]
+  std::vector<float> y, offset;                  // [set][line]; not for samples anywhere
   std::vector<std::uint32_t> valid;              // [line]: bits of real samples
   std::vector<std::int32_t> first;               // [line]: bit i is sample first + i of the set
-  std::vector<float> point_x, point_y, point_z;  // [set][KernelSamples::padded] the samples themselves, lattice, behind
-                                                 // kRoom others; with room for 48 more to be read
+  std::uint32_t stride = 0;                      // of a set in the arrays that follow
+  std::vector<float> point_x, point_y, point_z;  // [set][stride] the samples themselves, lattice, behind kRoom others;
+                                                 // with room for 48 more to be read
+  bool anywhere = false;
+  std::vector<float> column_of, row_of;  // anywhere: [set][stride] places in columns and rows from the centre
+  std::vector<std::uint16_t> sample_of;  // anywhere: [set][stride] their numbers
 
   /// Consecutive samples of a set.
   struct Run {
@@ -39,15 +47,15 @@ struct SampleRows {
   };
   std::vector<Run> runs;  // [row]
 
-  bool empty() const { return rows == 0; }
-  /// The coordinates (one of point_x, ...) of a line's samples, by bit; `padded` is KernelSamples::padded.
-  const float* line_points(const std::vector<float>& points, std::size_t set, std::uint32_t line,
-                           std::size_t padded) const {
-    return points.data() + kRoom + set * padded + first[line];
+  /// Can outlines of groups of triangles be drawn into it?
+  bool has_outlines() const { return anywhere || !place.empty(); }
+  /// The coordinates (one of point_x, ...) of a line's samples, by bit.
+  const float* line_points(const std::vector<float>& points, std::size_t set, std::uint32_t line) const {
+    return points.data() + kRoom + set * stride + first[line];
   }
 };
 
-/// Empty where the samples have no such rows: other shapes, patterns without rows, more columns or rows than those.
+/// Rows where the samples of a flat light have them; else they are taken for samples anywhere.
 /// `samples` must be in sample order (make_kernel_samples with SampleOrder::kAsGiven).
 /// `reuse` gives its memory.
 SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,

@@ -1,0 +1,145 @@
+// Samples anywhere in the pictures of a packet, per instruction set: where rows are found by one multiplication, these are
+// asked one by one, each for all receivers of the packet at once. Included once per Highway target by packet_kernel.cpp.
+
+#if defined(HALFSHADE_PACKET_ANYWHERE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef HALFSHADE_PACKET_ANYWHERE_INL_H_
+#undef HALFSHADE_PACKET_ANYWHERE_INL_H_
+#else
+#define HALFSHADE_PACKET_ANYWHERE_INL_H_
+#endif
+
+#include "shadows/packet_outline-inl.h"
+#include "shadows/packet_triangle-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace halfshade {
+namespace HWY_NAMESPACE {
+
+/// Where a sample lies in each receiver's picture.
+struct SamplePlace {
+  Vec column, row;
+
+  SamplePlace(const PlacedSamples& places, std::size_t at) {
+    const Tag d;
+    if (places.column != nullptr) {
+      column = hn::Set(d, places.column[at]), row = hn::Set(d, places.row[at]);
+    } else {
+      column = hn::Load(d, places.place[at].column), row = hn::Load(d, places.place[at].row);
+    }
+  }
+};
+
+/// A triangle's half planes, turned so that all limit from below: a sample is inside one where
+/// sign column + slope row > limit.
+class TriangleAnywhere {
+ public:
+  TriangleAnywhere(const SampleRows& rows, const PacketTriangle& triangle, const std::array<LaneMask, 4>& up)
+      : count_(triangle.count) {
+    const Tag d;
+    const Vec one = hn::Set(d, 1.0f), per_row = hn::Set(d, 1.0f / rows.row_scale);
+    for (std::size_t k = 0; k < count_; ++k) {
+      const HalfPlane& h = triangle.planes[k];
+      const Vec slope = hn::Mul(h.slope, per_row);
+      sign_[k] = hn::IfThenElse(up[k], one, hn::Neg(one));
+      slope_[k] = hn::IfThenElse(up[k], hn::Neg(slope), slope);
+      inside_[k] = hn::IfThenElse(up[k], h.most, hn::Neg(h.least));
+      possible_[k] = hn::IfThenElse(up[k], h.least, hn::Neg(h.most));
+    }
+  }
+
+  HWY_INLINE void Test(const SamplePlace& p, LaneMask& possible, LaneMask& inside) const {
+    for (std::size_t k = 0; k < count_; ++k) {
+      const Vec place = hn::MulAdd(sign_[k], p.column, hn::Mul(slope_[k], p.row));
+      const LaneMask may = hn::Ge(place, possible_[k]), is = hn::Gt(place, inside_[k]);
+      possible = k == 0 ? may : hn::And(possible, may);
+      inside = k == 0 ? is : hn::And(inside, is);
+    }
+  }
+
+ private:
+  std::size_t count_;
+  Vec sign_[4], slope_[4], inside_[4], possible_[4];
+};
+
+/// The edges as the receivers see them.
+///
+/// Where the ends of edges are rounded, the same for all edges that they belong to, a sample that no edge comes nearer to
+/// than that is wound around as often as before. So only samples near to an edge are doubtful.
+HWY_INLINE void GroupOutline::SetAnywhere() {
+  const Tag d;
+  const Vec row_scale = hn::Set(d, rows_.row_scale), scale = hn::Set(d, rows_.scale), half = hn::Set(d, 0.5f);
+  for (std::uint32_t e = 0; e < edges_.count; ++e) {
+    const std::size_t a = edges_.from[e], b = edges_.to[e];
+    const Vec xa = hn::Load(d, vertices_.column[a]), xb = hn::Load(d, vertices_.column[b]),
+              ya = hn::Load(d, vertices_.row[a]), yb = hn::Load(d, vertices_.row[b]);
+    const Vec dx = hn::Sub(xb, xa), dy = hn::Sub(yb, ya);
+    const Vec error =
+        hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])), hn::Set(d, rows_.deviation));
+    const Vec off = hn::MulAdd(error, row_scale, hn::Set(d, 2e-5f));  // in rows; samples are rounded, too
+    const LaneMask level = hn::Le(hn::Abs(dy), hn::Mul(off, hn::Set(d, 4.0f)));
+    const Vec slope = hn::IfThenZeroElse(level, hn::Mul(dx, Reciprocal(hn::IfThenElse(level, hn::Set(d, 1.0f), dy))));
+    const Vec rounding = hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(xb)), hn::Set(d, 0x1p-19f), hn::Set(d, 0x1p-15f));
+    Vec width = hn::MulAdd(error, scale, hn::MulAdd(hn::Abs(slope), hn::Add(off, off), rounding));
+    width = hn::Add(width, hn::IfThenElseZero(level, hn::Mul(hn::Abs(dx), half)));
+    hn::Store(slope, d, edges_.slope[e]);
+    hn::Store(width, d, edges_.width[e]);
+    hn::Store(hn::IfThenElse(level, hn::MulAdd(dx, half, xa), xa), d, edges_.column[e]);
+    hn::Store(hn::Sub(hn::Min(ya, yb), off), d, edges_.near_low[e]);
+    hn::Store(hn::Add(hn::Max(ya, yb), off), d, edges_.near_high[e]);
+  }
+  for (std::uint32_t e = edges_.count; e % hn::Lanes(d) != 0; ++e)
+    edges_.rows.low[e] = 1e30f, edges_.rows.high[e] = -1e30f;
+}
+
+/// The receivers for which the outline winds around a sample, and those for which that is uncertain.
+HWY_INLINE LaneMask GroupOutline::WindSample(std::size_t at, LaneMask& doubtful) const {
+  const Tag d;
+  const IntTag di;
+  const PlacedSamples& places = *packet_.places;
+  const SamplePlace sample(places, at);
+  const PlacedSamples::Bounds bounds =
+      places.column == nullptr
+          ? places.bounds[at]
+          : PlacedSamples::Bounds{places.column[at], places.column[at], places.row[at], places.row[at]};
+  const Vec low_column = hn::Set(d, bounds.low_column), high_column = hn::Set(d, bounds.high_column),
+            low_row = hn::Set(d, bounds.low_row), high_row = hn::Set(d, bounds.high_row);
+  auto around = hn::Zero(di);
+  const auto one = hn::Set(di, 1);
+  doubtful = hn::Lt(low_row, low_row);
+  for (std::size_t first = 0; first < edges_.count; first += hn::Lanes(d)) {
+    const LaneMask level = hn::And(hn::Le(hn::Load(d, edges_.rows.low + first), high_row),
+                                   hn::Ge(hn::Load(d, edges_.rows.high + first), low_row));
+    const LaneMask reaches = hn::And(level, hn::Le(hn::Load(d, edges_.columns.low + first), high_column));
+    const std::uint64_t over = Bits(hn::Ge(hn::Load(d, edges_.columns.high + first), low_column));
+    for (std::uint64_t bits = Bits(reaches); bits != 0; bits &= bits - 1) {
+      const auto k = static_cast<std::size_t>(std::countr_zero(bits));
+      const std::size_t e = first + k;
+      const Vec ya = hn::Load(d, vertices_.row[edges_.from[e]]);
+      const LaneMask behind = hn::Le(ya, sample.row),
+                     before = hn::Le(hn::Load(d, vertices_.row[edges_.to[e]]), sample.row);
+      LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
+      if (e >= edges_.fixed) Turn(e, down, up);
+      if ((over >> k & 1) != 0) {  // not beside it for all receivers
+        const Vec x =
+            hn::MulAdd(hn::Load(d, edges_.slope[e]), hn::Sub(sample.row, ya), hn::Load(d, edges_.column[e]));
+        const Vec beyond = hn::Sub(sample.column, x);
+        LaneMask near = hn::And(hn::Le(hn::Abs(beyond), hn::Load(d, edges_.width[e])),
+                                hn::And(hn::Ge(sample.row, hn::Load(d, edges_.near_low[e])),
+                                        hn::Le(sample.row, hn::Load(d, edges_.near_high[e]))));
+        if (e >= edges_.fixed) near = hn::And(near, Receivers(e));
+        doubtful = hn::Or(doubtful, near);
+        const LaneMask right = hn::Gt(beyond, hn::Zero(d));
+        down = hn::And(down, right), up = hn::And(up, right);
+      }
+      around = hn::Add(around, hn::IfThenElseZero(hn::RebindMask(di, down), one));
+      around = hn::Sub(around, hn::IfThenElseZero(hn::RebindMask(di, up), one));
+    }
+  }
+  return hn::RebindMask(d, hn::Ne(around, hn::Zero(di)));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace halfshade
+HWY_AFTER_NAMESPACE();
+
+#endif  // include guard
