@@ -328,7 +328,7 @@ int main(int argc, char** argv) {
   app.add_option("--methods", o.methods, "Shadow methods, separated by commas")->delimiter(',')->capture_default_str();
   app.add_option("--size", o.size, "Picture in pixels, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--light-samples", o.light_samples, "Samples per light, 1..4096")->capture_default_str();
-  app.add_option("--pattern", o.pattern, "Sample pattern: rows, uniform, stratified")->capture_default_str();
+  app.add_option("--pattern", o.pattern, "Sample pattern, as of halfshade render")->capture_default_str();
   app.add_option("--sets", o.sets, "Different sample sets, chosen per pixel, 1..256")->capture_default_str();
   app.add_option("--seed", o.seed, "Seed of patterns and sets")->capture_default_str();
   app.add_option("--light-scale", o.light_scales,

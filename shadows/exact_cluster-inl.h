@@ -23,7 +23,8 @@ struct Rectangle {
 /// Receivers as a box in the light's frame (a point for a single one), and what of the light they ask for.
 struct Shaft {
   float low[3], high[3];
-  Rectangle light;  // padded for rounding
+  Rectangle light;     // padded for rounding
+  float floor = 0.0f;  // height of the lowest sample; 0 where all lie in the plane
 };
 
 /// Rounding of a projection onto the light's plane: coordinates are below 4 and carry 1e-6, and the samples lie that
@@ -41,18 +42,22 @@ struct LaneRectangles {
 HWY_INLINE LaneMask ProjectBoxes(const Shaft& s, const float* const low[3], const float* const high[3], std::size_t i,
                                  LaneRectangles& q) {
   const Tag d;
-  const Vec zero = hn::Zero(d), tiny = hn::Set(d, 1e-30f);
-  const Vec z_low = hn::Max(hn::LoadU(d, low[2] + i), zero), z_high = hn::LoadU(d, high[2] + i);
+  const Vec floor = hn::Set(d, s.floor), tiny = hn::Set(d, 1e-30f);
+  const Vec z_low = hn::Max(hn::LoadU(d, low[2] + i), floor), z_high = hn::LoadU(d, high[2] + i);
   const Vec r_low = hn::Set(d, s.low[2]), r_high = hn::Set(d, s.high[2]);
-  const Vec near = hn::Div(r_high, hn::Max(hn::Sub(r_high, z_low), tiny));
-  const Vec far = hn::Div(r_low, hn::Max(hn::Sub(r_low, hn::Max(z_high, zero)), tiny));
+  // What lies behind the plane z = 0 projects towards the receivers, the more the lower they are.
+  const auto from = [&](Vec z, Vec above, Vec below) HWY_ATTR {
+    const Vec r = hn::IfThenElse(hn::Lt(z, hn::Zero(d)), below, above);
+    return hn::Div(r, hn::Max(hn::Sub(r, z), tiny));
+  };
+  const Vec near = from(z_low, r_high, r_low), far = from(hn::Max(z_high, floor), r_low, r_high);
   for (int k = 0; k < 2; ++k) {
     const Vec a = hn::Set(d, s.low[k]), b = hn::Set(d, s.high[k]);
     const Vec to_low = hn::Sub(hn::LoadU(d, low[k] + i), b), to_high = hn::Sub(hn::LoadU(d, high[k] + i), a);
     q.low[k] = hn::Add(b, hn::Min(hn::Mul(to_low, near), hn::Mul(to_low, far)));
     q.high[k] = hn::Add(a, hn::Max(hn::Mul(to_high, near), hn::Mul(to_high, far)));
   }
-  return hn::And(hn::Lt(z_low, r_high), hn::Ge(z_high, zero));
+  return hn::And(hn::Lt(z_low, r_high), hn::Ge(z_high, floor));
 }
 
 /// Which of the boxes can hold a point between the receivers and the light?
@@ -138,19 +143,36 @@ HWY_INLINE LaneMask LanesFromBits(std::uint32_t bits, std::size_t first) {
   return hn::LoadMaskBits(d, bytes);
 }
 
+/// Where the receivers of a box, all above it, see the box around a cloud of samples before the plane z = 0: a sample l
+/// at l + (l - r) k with k = l_z / (r_z - l_z).
+HWY_INLINE Rectangle ProjectCloud(const SampleCloud& cloud, const Shaft& box) {
+  const float below = cloud.low.z, above = cloud.high.z;
+  const float k[2] = {below / ((below < 0.0f ? box.low[2] : box.high[2]) - below),
+                      above / ((above < 0.0f ? box.high[2] : box.low[2]) - above)};
+  float low[2], high[2];
+  for (int axis = 0; axis < 2; ++axis) {
+    const float away_low = cloud.low[axis] - box.high[axis], away_high = cloud.high[axis] - box.low[axis];
+    const float by[4] = {away_low * k[0], away_low * k[1], away_high * k[0], away_high * k[1]};
+    low[axis] = cloud.low[axis] + *std::min_element(by, by + 4);
+    high[axis] = cloud.high[axis] + *std::max_element(by, by + 4);
+  }
+  return {low[0], low[1], high[0], high[1]};
+}
+
 /// Groups that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
 /// the receivers are lit.
 HWY_INLINE bool ListGroups(const ExactScene& scene, std::size_t begin, std::size_t end,
                            const KernelReceivers& receivers, ExactScratch& scratch) {
-  Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};
+  Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}, 0.0f};
   for (std::size_t i = begin; i < end; ++i) {
     const vec3 p(scene.frame.to_frame(dvec3(receivers.x[i], receivers.y[i], receivers.z[i])));
     for (int k = 0; k < 3; ++k)
       shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
   }
-  const vec3 low = scene.rows->low, high = scene.rows->high;
+  Rectangle light{scene.rows->low.x, scene.rows->low.y, scene.rows->high.x, scene.rows->high.y};
+  if (scene.cloud != nullptr) light = ProjectCloud(*scene.cloud, shaft), shaft.floor = scene.cloud->low.z;
   const float pad = ProjectionPad(shaft.low[2]);
-  shaft.light = {low.x - pad, low.y - pad, high.x + pad, high.y + pad};
+  shaft.light = {light.low_u - pad, light.low_v - pad, light.high_u + pad, light.high_v + pad};
   CollectGroups(*scene.fit, shaft, scratch);
   scratch.leaves_listed += scratch.group.size();
   if (scratch.group.empty()) {

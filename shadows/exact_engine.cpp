@@ -19,12 +19,30 @@ constexpr std::size_t kClustersPerTask = 2;
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
 constexpr double kGrazing = 1e-5;
 
-/// Receivers in front of the light on its z > 0 side, along Hilbert's curve through their positions: the packets and
-/// clusters that they form must be compact.
-void order_receivers(const ReceiverArray& receivers, const LightFrame& frame, ExactWork& work) {
+/// As are those that lie no farther above a light without plane than this share of its height.
+constexpr double kNear = 0.1;
+
+constexpr std::uint8_t kNoSide = 0xff, kUnlit = 0xfe;
+
+/// The side of the light that a receiver is on; kUnlit behind a light that shines to one side only.
+std::uint8_t side_of(const ExactLight& light, const vec3& position) {
+  double best = -HUGE_VAL, least = kGrazing;
+  std::uint8_t side = kNoSide;
+  for (std::size_t k = 0; k < light.count; ++k) {
+    const double z = light.sides[k].frame.to_frame(dvec3(position)).z;
+    if (z <= best) continue;
+    best = z, side = static_cast<std::uint8_t>(k);
+    if (!light.bound.flat) least = std::max(kGrazing, (1.0 + kNear) * double{light.sides[k].cloud.high.z});
+  }
+  if (best > least) return side;
+  return light.count == 1 && best < -kGrazing ? kUnlit : kNoSide;
+}
+
+/// Receivers of a side along Hilbert's curve through their positions: the packets and clusters that they form must be
+/// compact.
+void order_receivers(const ReceiverArray& receivers, std::uint8_t side, ExactWork& work) {
   order_along<HilbertCurve>(
-      receivers.position, [&](std::uint32_t i) { return frame.to_frame(dvec3(receivers.position[i])).z > kGrazing; },
-      work.curve, work.order);
+      receivers.position, [&](std::uint32_t i) { return work.side[i] == side; }, work.curve, work.order);
 }
 
 void add_counters(const ScratchPool& scratches, ShadowStats& stats) {
@@ -39,10 +57,10 @@ void add_counters(const ScratchPool& scratches, ShadowStats& stats) {
 }
 
 /// The tree as this side sees it, unless it is so already.
-void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, const LightFrame& frame, ExactSide& side) {
+void fit_side(const ExactBlockers& blockers, const KernelSamples& samples, ExactSide& side) {
   if (side.fitted && side.usable == samples.closed_usable) return;
   side.fitted = false;
-  fit_blocker_tree(blockers.mesh, *blockers.tree, samples, frame, side.fit);
+  fit_blocker_tree(blockers.mesh, *blockers.tree, samples, side.frame, side.fit);
   side.usable = samples.closed_usable;
   side.fitted = true;
 }
@@ -62,11 +80,11 @@ class ScratchLoan {
 };
 
 /// All receivers on one side of the light.
-void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, const LightFrame& frame,
-                const ShadowConfig& config, const ExactLight& kept, ExactSide& side, ExactWork& work,
-                VisibilityMasks& masks, ShadowStats& stats) {
+void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, const ShadowConfig& config,
+                ExactLight& kept, std::uint8_t number, ExactWork& work, VisibilityMasks& masks, ShadowStats& stats) {
   Stopwatch watch;
-  order_receivers(receivers, frame, work);
+  ExactSide& side = kept.sides[number];
+  order_receivers(receivers, number, work);
   const std::vector<std::uint32_t>& order = work.order;
   if (order.empty()) return;
   KernelReceivers& kernel = work.receivers;
@@ -76,9 +94,10 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   kernel.mask_at.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
   stats.index_ms += watch.lap();
-  fit_side(blockers, samples, frame, side);
+  fit_side(blockers, samples, side);
   stats.cull_ms += watch.lap();
-  const ExactScene scene{blockers.tree, &side.fit, &samples, &kept.rows, frame};
+  const SampleCloud* const cloud = kept.bound.flat ? nullptr : &side.cloud;
+  const ExactScene scene{blockers.tree, &side.fit, &samples, &kept.rows, cloud, side.frame};
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   const std::size_t nodes = blockers.tree->nodes.size();
@@ -101,12 +120,12 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
 }
 
 void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                   const LightSamples& samples, const LightFrame& frame, const ShadowConfig& config,
+                   const LightSamples& samples, const std::vector<std::uint8_t>& side, const ShadowConfig& config,
                    VisibilityMasks& masks, ShadowStats& stats) {
   ReceiverArray grazing;
   std::vector<std::uint32_t> order;
   for (std::uint32_t i = 0; i < receivers.size(); ++i) {
-    if (!(std::fabs(frame.to_frame(dvec3(receivers.position[i])).z) <= kGrazing)) continue;
+    if (side[i] != kNoSide) continue;
     grazing.push_back(receivers.position[i], receivers.normal[i], receivers.triangle[i], receivers.sample[i],
                       receivers.set[i]);
     order.push_back(i);
@@ -165,7 +184,7 @@ void ScratchPool::give(ExactScratch& scratch) {
 void ExactWork::reserve(std::size_t count, std::size_t words) {
   const std::size_t padded = count + KernelReceivers::kLanePadding;
   curve.reserve(count);
-  order.reserve(count);
+  side.reserve(count), order.reserve(count);
   receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
   receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
   receivers.masks.reserve(count * words), receivers.mask_at.reserve(count);
@@ -180,7 +199,16 @@ void prepare_exact_light(const Light& light, const LightSamples& samples, ExactL
 void prepare_exact_samples(const LightSamples& samples, ExactLight& kept) {
   kept.front = {dvec3(kept.bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
   kept.samples = make_kernel_samples(samples, kept.bound, SampleOrder::kAsGiven, std::move(kept.samples));
-  kept.rows = find_sample_rows(samples, kept.samples, kept.front, std::move(kept.rows));
+  const auto& [center, u, v, n] = kept.front;
+  const LightFrame frames[6] = {{center, u, v, n}, {center, u, v, -n}, {center, v, n, u},
+                                {center, v, n, -u}, {center, n, u, v}, {center, n, u, -v}};
+  kept.count = samples.one_sided ? 1 : samples.flat ? 2 : 6;
+  for (std::size_t k = 0; k < kept.count; ++k) {
+    ExactSide& side = kept.sides[k];
+    side.frame = frames[k];
+    if (!samples.flat) side.cloud = make_sample_cloud(kept.samples, side.frame, std::move(side.cloud));
+  }
+  if (samples.flat) kept.rows = find_sample_rows(samples, kept.samples, kept.front, std::move(kept.rows));
 }
 
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,
@@ -194,19 +222,19 @@ void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, 
     kept.samples.closed = nullptr;
     kept.samples.closed_usable.clear();
   }
-  solve_side(blockers, receivers, kept.front, config, kept, kept.sides[0], work, masks, stats);
-  solve_grazing(blockers.mesh, receivers, light, samples, kept.front, config, masks, stats);
-  if (samples.one_sided) return;
-  const LightFrame back{kept.front.origin, kept.front.u, kept.front.v, -kept.front.n};
-  solve_side(blockers, receivers, back, config, kept, kept.sides[1], work, masks, stats);
+  Stopwatch watch;
+  work.side.resize(receivers.size());
+  parallel_ranges(receivers.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) work.side[i] = side_of(kept, receivers.position[i]);
+  });
+  stats.index_ms += watch.lap();
+  for (std::size_t k = 0; k < kept.count; ++k)
+    solve_side(blockers, receivers, config, kept, static_cast<std::uint8_t>(k), work, masks, stats);
+  solve_grazing(blockers.mesh, receivers, light, samples, work.side, config, masks, stats);
 }
 
 void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
-  if (!samples.flat) {
-    solve_alias_free_shadow_map(mesh, receivers, light, samples, config, masks, stats);
-    return;
-  }
   Stopwatch watch;
   ExactLight kept;
   ExactWork work;

@@ -23,8 +23,11 @@ struct ExactBlockers {
   const BlockerTree* tree = nullptr;         // as built or placed
 };
 
-/// One side of a light and the blockers as it sees them.
+/// One side of a light, or for samples that lie in no plane one of the six directions in which receivers may lie, and
+/// the blockers as seen from there.
 struct ExactSide {
+  LightFrame frame;
+  SampleCloud cloud;  // not for flat lights
   BlockerFit fit;
   bool fitted = false;               // it belongs to the light's samples and to the blockers
   std::vector<std::uint8_t> usable;  // the certificates that it was made with
@@ -35,11 +38,14 @@ struct ExactLight {
   LightBound bound;
   LightFrame front;
   KernelSamples samples;
-  SampleRows rows;
-  std::array<ExactSide, 2> sides;
+  SampleRows rows;        // of flat lights
+  std::size_t count = 0;  // sides that receivers may be on
+  std::array<ExactSide, 6> sides;
 
   /// The blockers are others, or moved.
-  void unfit() { sides[0].fitted = sides[1].fitted = false; }
+  void unfit() {
+    for (ExactSide& side : sides) side.fitted = false;
+  }
 };
 
 /// One for each thread at work, kept from call to call.
@@ -61,6 +67,7 @@ class ScratchPool {
 /// Scratch of a call.
 struct ExactWork {
   CurveScratch curve;
+  std::vector<std::uint8_t> side;  // of each receiver
   std::vector<std::uint32_t> order;
   KernelReceivers receivers;
   ScratchPool scratches;
@@ -69,20 +76,21 @@ struct ExactWork {
   void reserve(std::size_t count, std::size_t words);
 };
 
-/// For flat lights. What `kept` held before gives its memory.
+/// What `kept` held before gives its memory.
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept);
 
 /// The samples alone, all within kept.bound. Sides stay as they were fitted.
 void prepare_exact_samples(const LightSamples& samples, ExactLight& kept);
 
 /// Masks of all receivers, exact, by a light that was prepared. Allocates nothing where `work` has room for the
-/// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane.
+/// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane or near to
+/// a light that has none.
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, ExactLight& kept, ExactWork& work,
                  VisibilityMasks& masks, ShadowStats& stats);
 
-/// Masks of all receivers, exact. Flat lights; point, spherical and volumetric lights are handed to the alias-free
-/// shadow map, which gives the same masks.
+/// Masks of all receivers, exact. Receivers in the light's plane or near to a light that has none are handed to the
+/// alias-free shadow map, which gives the same masks.
 void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats);
 

@@ -10,6 +10,7 @@ struct ExactScene {
   const BlockerFit* fit = nullptr;  // of the tree, to the samples
   const KernelSamples* samples = nullptr;
   const SampleRows* rows = nullptr;
+  const SampleCloud* cloud = nullptr;  // of samples that lie in no plane: `rows` are made for each cluster
   LightFrame frame;
 };
 
@@ -36,9 +37,6 @@ struct PlacedSamples {
   const float *column = nullptr, *row = nullptr;  // of all receivers; or null, and:
   std::vector<Place> place;
   std::vector<Bounds> bounds;  // over all receivers
-
-  /// For receivers of these sets; lanes beyond `count` are like the last.
-  void set(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
 };
 
 /// What a cluster of receivers sees of a group (packet_kernel.cpp).
@@ -84,6 +82,8 @@ struct TurningTriangle {
 struct ExactScratch {
   PictureLines lines;
   PlacedSamples places;
+  SampleRows rows;                   // of a cloud, as the cluster at work sees it
+  std::vector<std::uint8_t> wanted;  // sets of its receivers
   std::vector<std::uint32_t> stack, group;            // node stack; collected groups
   std::vector<float> low[3], high[3];                 // their boxes, light frame, padded to full vectors
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting

@@ -33,7 +33,7 @@ HWY_INLINE Vec Reciprocal(Vec a) {
 struct ReceiverBox {
   vec3 low{1e30f}, high{-1e30f};  // lattice
   Shaft shaft{
-      {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}};  // the light's frame, and what of the light is asked
+      {1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}, 0.0f};  // the light's frame, and what of the light is asked
 
   void add(const LightFrame& frame, const vec3& r) {
     const vec3 p(frame.to_frame(dvec3(r)));
@@ -223,13 +223,15 @@ HWY_INLINE LaneMask ProjectOntoLight(const LightFrame& frame, const std::array<V
   pad = hn::Add(magnified, hn::Set(d, ProjectionPad(box.low[2])));
   const Vec everywhere = hn::Set(d, 1e9f), margin = hn::Set(d, 2e-5f), zero = hn::Zero(d);
   const Vec depth = hn::Add(hn::Max(hn::Sub(hn::Set(d, box.high[2]), lowest), zero), margin);
+  // What lies behind the plane z = 0 may project nearer to them.
+  const LaneMask behind = hn::Lt(lowest, hn::Set(d, box.floor < 0.0f ? 0.0f : -1e30f));
   const Vec away_by = hn::Div(hn::Mul(hn::Max(hn::Sub(lowest, margin), zero), hn::Set(d, 0.999f)), depth);
   for (int axis = 0; axis < 2; ++axis) {
     const Vec low = hn::IfThenElse(
-        hn::Gt(nearest[axis], margin),
+        hn::AndNot(behind, hn::Gt(nearest[axis], margin)),
         hn::MulAdd(hn::Sub(nearest[axis], margin), away_by, hn::Sub(place_low[axis], margin)), hn::Neg(everywhere));
     const Vec high =
-        hn::IfThenElse(hn::Lt(last[axis], hn::Neg(margin)),
+        hn::IfThenElse(hn::AndNot(behind, hn::Lt(last[axis], hn::Neg(margin))),
                        hn::MulAdd(hn::Add(last[axis], margin), away_by, hn::Add(place_high[axis], margin)), everywhere);
     q.low[axis] = hn::IfThenElse(bounded, hn::Sub(q.low[axis], pad), low);
     q.high[axis] = hn::IfThenElse(bounded, hn::Add(q.high[axis], pad), high);

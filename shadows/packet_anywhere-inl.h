@@ -29,6 +29,75 @@ struct SamplePlace {
   }
 };
 
+/// The samples of a packet's receivers, which belong to these sets. Where they differ between receivers: in their sets,
+/// or because they are a cloud (`is_cloud`). A sample l of that is seen from r at l + (l - r) k with k = l_z / (r_z - l_z).
+HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const std::uint8_t* set, const Packet& packet,
+                             PlacedSamples& places) {
+  const Tag d;
+  const std::size_t first = std::size_t{set[0]} * rows.stride;
+  const bool alike = std::all_of(set, set + packet.count, [&](std::uint8_t s) { return s == set[0]; });
+  places.column = places.row = nullptr;
+  if (alike && !is_cloud) {
+    places.column = rows.column_of.data() + first, places.row = rows.row_of.data() + first;
+    return;
+  }
+  places.place.resize(rows.stride), places.bounds.resize(rows.stride);
+  const LaneMask in_packet = hn::FirstN(d, packet.count);
+  const auto lowest = [&](Vec v) HWY_ATTR {
+    return hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(in_packet, v, hn::Set(d, 1e30f))));
+  };
+  const auto highest = [&](Vec v) HWY_ATTR {
+    return hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElse(in_packet, v, hn::Set(d, -1e30f))));
+  };
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    for (std::uint32_t bits = rows.valid[line]; bits != 0; bits &= bits - 1) {
+      const std::size_t at = line * SampleRows::kWord + static_cast<std::size_t>(std::countr_zero(bits));
+      const auto of_lanes = [&](const std::vector<float>& values) HWY_ATTR {
+        if (alike) return hn::Set(d, values[first + at]);
+        alignas(HWY_MAX_BYTES) float value[kMaxLanes];
+        for (std::size_t k = 0; k < hn::Lanes(d); ++k)
+          value[k] = values[std::size_t{set[std::min(k, packet.count - 1)]} * rows.stride + at];
+        return hn::Load(d, value);
+      };
+      Vec column = of_lanes(rows.column_of), row = of_lanes(rows.row_of);
+      if (is_cloud) {
+        const Vec z = of_lanes(rows.height_of), k = hn::Div(z, hn::Sub(packet.height, z));
+        column = hn::MulAdd(hn::Sub(column, packet.column), k, column);
+        row = hn::MulAdd(hn::Sub(row, packet.row), k, row);
+      }
+      hn::Store(column, d, places.place[at].column), hn::Store(row, d, places.place[at].row);
+      places.bounds[at] = {lowest(column), highest(column), lowest(row), highest(row)};
+    }
+  }
+}
+
+/// What SampleRows says of where samples lie, of a cloud as a packet sees it.
+HWY_INLINE void BoundPlaces(const SampleCloud& cloud, const Packet& packet, const PlacedSamples& places,
+                            SampleRows& rows) {
+  rows.least_offset = rows.least_row_offset = 1e30f, rows.most_offset = rows.most_row_offset = -1e30f;
+  float reach_row = 0.0f;
+  for (std::uint32_t row = 0; row < rows.rows; ++row) {
+    for (std::uint32_t i = 0; i < rows.runs[row].count; ++i) {
+      const PlacedSamples::Bounds& b = places.bounds[rows.slot(row, i)];
+      const auto column = static_cast<float>(i), line = static_cast<float>(row);
+      rows.least_offset = std::min(rows.least_offset, column - b.high_column);
+      rows.most_offset = std::max(rows.most_offset, column - b.low_column);
+      rows.least_row_offset = std::min(rows.least_row_offset, line - b.high_row);
+      rows.most_row_offset = std::max(rows.most_row_offset, line - b.low_row);
+      reach_row = std::max({reach_row, -b.low_row, b.high_row});
+    }
+  }
+  rows.reach_y = reach_row / rows.row_scale;
+  // In units of 2^-24: a coordinate of a sample is within |l - c|, one of a receiver and its height within 6 |r - c|,
+  // and so k within its share of 7 (|r - c| + |l - c|) / (r_z - l_z); the rest is rounding.
+  const Tag d;
+  const vec3 size = glm::max(glm::abs(cloud.low), glm::abs(cloud.high));
+  const float reach = size.x + size.y + size.z;
+  const float far = reach + 0.2f * hn::GetLane(hn::MaxOfLanes(d, packet.place_error));  // which is 5 |r - c|
+  const float above = packet.shaft.low[2] - cloud.high.z, k = size.z / above;
+  rows.deviation = 0x1.1p-24f * (far * k * (8.0f * far / above + 20.0f) + 8.0f * reach);
+}
+
 /// A triangle's half planes, turned so that all limit from below: a sample is inside one where
 /// sign column + slope row > limit.
 class TriangleAnywhere {
@@ -75,11 +144,11 @@ HWY_INLINE void GroupOutline::SetAnywhere() {
     const Vec dx = hn::Sub(xb, xa), dy = hn::Sub(yb, ya);
     const Vec error =
         hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])), hn::Set(d, rows_.deviation));
-    const Vec off = hn::MulAdd(error, row_scale, hn::Set(d, 2e-5f));  // in rows; samples are rounded, too
+    const Vec off = hn::MulAdd(error, row_scale, hn::Set(d, 1e-5f));  // in rows; samples are rounded, too
     const LaneMask level = hn::Le(hn::Abs(dy), hn::Mul(off, hn::Set(d, 4.0f)));
     const Vec slope = hn::IfThenZeroElse(level, hn::Mul(dx, Reciprocal(hn::IfThenElse(level, hn::Set(d, 1.0f), dy))));
     const Vec rounding = hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(xb)), hn::Set(d, 0x1p-19f), hn::Set(d, 0x1p-15f));
-    Vec width = hn::MulAdd(error, scale, hn::MulAdd(hn::Abs(slope), hn::Add(off, off), rounding));
+    Vec width = hn::MulAdd(error, scale, hn::MulAdd(hn::Abs(slope), off, rounding));
     width = hn::Add(width, hn::IfThenElseZero(level, hn::Mul(hn::Abs(dx), half)));
     hn::Store(slope, d, edges_.slope[e]);
     hn::Store(width, d, edges_.width[e]);

@@ -54,6 +54,7 @@ class PacketSolver {
 
  private:
   bool Begin(std::size_t first, std::size_t count);
+  void FindPlaces();
   bool FindOpenPart();
   bool RasterizeGroup(const BlockerTree::Node& group, GroupView& view);
   bool RasterizePatch(const BlockerTree::Node& group, const GroupView& view, const std::uint16_t* patch,
@@ -126,20 +127,33 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   packet_.height = Dot(from_center, Splat(vec3(scene_.frame.n)));
   packet_.place_error = hn::Mul(hn::Set(d, 5.0f), Norm1(from_center));
   packet_.height_error = hn::Add(hn::Div(packet_.place_error, packet_.height), hn::Set(d, 14.0f));
-  packet_.distance =
-      hn::Add(NormMax(packet_.to_center), hn::Set(d, scene_.samples->reach + rows_.deviation / kDeterminantError));
+  FindPlaces();
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));
-  if (rows_.anywhere) {
-    scratch_.places.set(rows_, receivers_.set.data() + first, count);
-  } else {
-    scratch_.lines.place(rows_, receivers_.set.data() + first, count);
-  }
-  packet_.lines = &scratch_.lines, packet_.places = &scratch_.places;
   for (std::uint32_t line = 0; line < rows_.lines; ++line)
     hn::Store(hn::IfThenElseZero(in_packet, hn::Set(du, rows_.valid[line])), du, packet_.open[line]);
   for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
   outline_.Begin();
   return FindOpenPart();
+}
+
+/// Where the receivers see their samples.
+void PacketSolver::FindPlaces() {
+  const Tag d;
+  const std::uint8_t* const set = receivers_.set.data() + packet_.first;
+  packet_.lines = &scratch_.lines, packet_.places = &scratch_.places;
+  float reach = scene_.samples->reach;
+  if (rows_.anywhere) {
+    PlaceSamples(rows_, scene_.cloud != nullptr, set, packet_, scratch_.places);
+  } else {
+    scratch_.lines.place(rows_, set, packet_.count);
+  }
+  if (scene_.cloud != nullptr) {
+    BoundPlaces(*scene_.cloud, packet_, scratch_.places, scratch_.rows);
+    packet_.shaft.floor = scene_.cloud->low.z;
+    const float columns = static_cast<float>(rows_.columns) + std::max(-rows_.least_offset, rows_.most_offset);
+    reach = columns / rows_.scale + rows_.reach_y;
+  }
+  packet_.distance = hn::Add(NormMax(packet_.to_center), hn::Set(d, reach + rows_.deviation / kDeterminantError));
 }
 
 /// What some receiver has open, after lines changed; false where nothing is.
@@ -360,6 +374,14 @@ HWY_INLINE void PacketSolver::SetPlanes(PacketTriangle& triangle) const {
   }
   triangle.count = 3;
   if (!triangle.samples_above || !triangle.samples_below) return;
+  if (scene_.cloud != nullptr) {
+    // Above all samples it hides what lies behind it.
+    const auto is_above = [&](const vec3& p) {
+      return scene_.frame.to_frame(dvec3(p)).z > double{scene_.cloud->high.z};
+    };
+    triangle.cuts_cloud = !std::all_of(triangle.corner.begin(), triangle.corner.end(), is_above);
+    return;
+  }
   const BlockerPlane& plane = triangle.plane;
   const SampleSides sides = sides_of_samples(plane, triangle.corner[0], *scene_.samples);
   const float error = sides.plane_error + plane.side_error * (rows_.deviation / kDeterminantError);
@@ -479,6 +501,7 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
     ++counters_.sample_tests;
     if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return;
     inside = hn::And(asked, rows_.anywhere ? inside : outline.inside(y, offset, rest));
+    if (triangle.cuts_cloud) inside = hn::Zero(du);
     if (triangle.alpha != nullptr || !hn::AllTrue(du, hn::Eq(possible, inside))) {
       alignas(HWY_MAX_BYTES) std::uint32_t may[kMaxLanes], does[kMaxLanes];
       hn::Store(possible, du, may), hn::Store(inside, du, does);
@@ -559,8 +582,23 @@ void PacketSolver::StoreMasks() {
   }
 }
 
-void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+/// A cloud's samples as the middle of the receivers sees them.
+void ArrangeCloud(const ExactScene& scene, const ReceiverBox& box, std::span<const std::uint8_t> sets,
                   ExactScratch& scratch) {
+  bool is_wanted[256] = {};
+  scratch.wanted.clear();
+  for (const std::uint8_t set : sets) {
+    if (!is_wanted[set]) scratch.wanted.push_back(set);
+    is_wanted[set] = true;
+  }
+  vec3 middle;
+  for (int k = 0; k < 3; ++k) middle[k] = 0.5f * (box.shaft.low[k] + box.shaft.high[k]);
+  arrange_cloud(*scene.cloud, *scene.samples, scene.frame, middle, scratch.wanted, scratch.rows);
+}
+
+void SolvePackets(const ExactScene& given, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+                  ExactScratch& scratch) {
+  ExactScene scene = given;
   if (!ListGroups(scene, begin, end, receivers, scratch)) return;
   const std::size_t lanes = hn::Lanes(Tag());
   ReceiverBox cluster;
@@ -572,6 +610,10 @@ void SolvePackets(const ExactScene& scene, std::size_t begin, std::size_t end, K
       scratch.own_places.push_back(place[receivers.own[i]]);
   }
   std::sort(scratch.own_places.begin(), scratch.own_places.end());
+  if (scene.cloud != nullptr) {
+    ArrangeCloud(scene, cluster, std::span(receivers.set).subspan(begin, end - begin), scratch);
+    scene.rows = &scratch.rows;
+  }
   if (scratch.groups.size() < scratch.group.size()) scratch.groups.resize(scratch.group.size());
   for (GroupView& view : scratch.groups) view.known = false;
   scratch.net_edges.count = 0;
@@ -598,29 +640,6 @@ void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::s
     }
   }
   placed = alike ? set[0] : kMixed;
-}
-
-void PlacedSamples::set(const SampleRows& rows, const std::uint8_t* set, std::size_t count) {
-  column = row = nullptr;
-  if (std::all_of(set, set + count, [&](std::uint8_t s) { return s == set[0]; })) {
-    column = rows.column_of.data() + std::size_t{set[0]} * rows.stride;
-    row = rows.row_of.data() + std::size_t{set[0]} * rows.stride;
-    return;
-  }
-  place.resize(rows.stride), bounds.resize(rows.stride);
-  for (std::uint32_t line = 0; line < rows.lines; ++line) {
-    const std::uint32_t end = line * SampleRows::kWord + static_cast<std::uint32_t>(std::bit_width(rows.valid[line]));
-    for (std::uint32_t at = line * SampleRows::kWord; at < end; ++at) {
-      Bounds b{1e30f, -1e30f, 1e30f, -1e30f};
-      for (std::size_t lane = 0; lane < PictureLines::kLanes; ++lane) {
-        const std::size_t from = std::size_t{set[std::min(lane, count - 1)]} * rows.stride + at;
-        const float x = rows.column_of[from], y = rows.row_of[from];
-        place[at].column[lane] = x, place[at].row[lane] = y;
-        b = {std::min(b.low_column, x), std::max(b.high_column, x), std::min(b.low_row, y), std::max(b.high_row, y)};
-      }
-      bounds[at] = b;
-    }
-  }
 }
 
 HWY_EXPORT(SolvePackets);

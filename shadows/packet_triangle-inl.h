@@ -54,6 +54,7 @@ struct PacketTriangle {
   const AlphaTriangle* alpha;         // null where it is opaque
   std::array<HalfPlane, 4> planes;  // through receiver and edge, oriented for a plane above the receiver; its own plane
   std::size_t count;                // 3; 4 where samples lie on both sides of its plane
+  bool cuts_cloud = false;          // samples that lie in no plane are on both sides of its plane
 };
 
 /// Limits of all lanes in order: two (the same twice where there is one) from below, two from above.

@@ -38,6 +38,7 @@ struct SampleRows {
                                                  // with room for 48 more to be read
   bool anywhere = false;
   std::vector<float> column_of, row_of;  // anywhere: [set][stride] places in columns and rows from the centre
+  std::vector<float> height_of;          // of a cloud: [set][stride] z in lengths
   std::vector<std::uint16_t> sample_of;  // anywhere: [set][stride] their numbers
 
   /// Consecutive samples of a set.
@@ -47,6 +48,10 @@ struct SampleRows {
   };
   std::vector<Run> runs;  // [row]
 
+  /// Samples anywhere: place of a row's i-th sample in a set's arrays.
+  std::size_t slot(std::uint32_t row, std::uint32_t i) const {
+    return std::size_t{i / kWord * rows + row} * kWord + i % kWord;
+  }
   /// Can outlines of groups of triangles be drawn into it?
   bool has_outlines() const { return anywhere || !place.empty(); }
   /// The coordinates (one of point_x, ...) of a line's samples, by bit.
@@ -55,10 +60,25 @@ struct SampleRows {
   }
 };
 
+/// Samples that lie in no plane, in a frame of the light: [set][KernelSamples::padded].
+struct SampleCloud {
+  std::vector<vec3> place;
+  vec3 low{1e30f}, high{-1e30f};  // around all of them, rounded outwards
+};
+
 /// Rows where the samples of a flat light have them; else they are taken for samples anywhere.
 /// `samples` must be in sample order (make_kernel_samples with SampleOrder::kAsGiven).
 /// `reuse` gives its memory.
 SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samples, const LightFrame& frame,
                             SampleRows reuse = {});
+
+/// `reuse` gives its memory.
+SampleCloud make_sample_cloud(const KernelSamples& samples, const LightFrame& frame, SampleCloud reuse = {});
+
+/// A cloud as samples anywhere, sorted by where they are seen before the plane z = 0 from `from`, which lies above all
+/// of them: their numbers, unprojected places and points for the sets that `wanted` names. Where each receiver sees them,
+/// and so offsets, `deviation` and `reach_y`, is up to the packets (packet_anywhere-inl.h).
+void arrange_cloud(const SampleCloud& cloud, const KernelSamples& samples, const LightFrame& frame, const vec3& from,
+                   std::span<const std::uint8_t> wanted, SampleRows& rows);
 
 }  // namespace halfshade

@@ -190,7 +190,7 @@ void solve_exact_kept(const Call& call, const Light& light, KeptLight& kept, Sha
 void solve_lit(const Call& call, const Light& light, KeptLight& kept) {
   Workspace::Impl& w = call.workspace;
   ShadowStats stats;
-  if (call.config.method == ShadowMethod::kExact && kept.samples.flat) {
+  if (call.config.method == ShadowMethod::kExact) {
     solve_exact_kept(call, light, kept, stats);
   } else if (yields_masks(call.config)) {
     solve_masks(call.scene.mesh, w.lit.array, light, kept.samples, call.config, w.masks, stats);

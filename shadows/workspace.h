@@ -27,7 +27,7 @@ struct KeptLight {
   EmissionImage image;
   std::vector<vec3> weights;  // of the image, [set][sample]
 
-  // Method exact, flat lights.
+  // Method exact.
   bool prepared = false;  // `exact` belongs to the samples
   ExactLight exact;
   std::shared_ptr<const int> scene;  // identity of the scene that `exact` was fitted to, and its version
