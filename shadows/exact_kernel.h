@@ -37,6 +37,8 @@ struct PlacedSamples {
   const float *column = nullptr, *row = nullptr;  // of all receivers; or null, and:
   std::vector<Place> place;
   std::vector<Bounds> bounds;  // over all receivers
+  // [line][receiver]: bits of its samples
+  alignas(64) std::uint32_t valid[SampleRows::kMaxLines][PictureLines::kLanes];
 };
 
 /// What a cluster of receivers sees of a group (packet_kernel.cpp).

@@ -37,6 +37,14 @@ HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const std::u
   const std::size_t first = std::size_t{set[0]} * rows.stride;
   const bool alike = std::all_of(set, set + packet.count, [&](std::uint8_t s) { return s == set[0]; });
   places.column = places.row = nullptr;
+  std::uint32_t used[kMaxLines];
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    used[line] = 0;
+    for (std::size_t k = 0; k < kMaxLanes; ++k) {
+      places.valid[line][k] = k < packet.count ? rows.valid_of(set[k], line) : 0;
+      used[line] |= places.valid[line][k];
+    }
+  }
   if (alike && !is_cloud) {
     places.column = rows.column_of.data() + first, places.row = rows.row_of.data() + first;
     return;
@@ -50,7 +58,7 @@ HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const std::u
     return hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElse(in_packet, v, hn::Set(d, -1e30f))));
   };
   for (std::uint32_t line = 0; line < rows.lines; ++line) {
-    for (std::uint32_t bits = rows.valid[line]; bits != 0; bits &= bits - 1) {
+    for (std::uint32_t bits = used[line]; bits != 0; bits &= bits - 1) {
       const std::size_t at = line * SampleRows::kWord + static_cast<std::size_t>(std::countr_zero(bits));
       const auto of_lanes = [&](const std::vector<float>& values) HWY_ATTR {
         if (alike) return hn::Set(d, values[first + at]);
@@ -76,14 +84,18 @@ HWY_INLINE void BoundPlaces(const SampleCloud& cloud, const Packet& packet, cons
                             SampleRows& rows) {
   rows.least_offset = rows.least_row_offset = 1e30f, rows.most_offset = rows.most_row_offset = -1e30f;
   float reach_row = 0.0f;
-  for (std::uint32_t row = 0; row < rows.rows; ++row) {
-    for (std::uint32_t i = 0; i < rows.runs[row].count; ++i) {
-      const PlacedSamples::Bounds& b = places.bounds[rows.slot(row, i)];
-      const auto column = static_cast<float>(i), line = static_cast<float>(row);
+  for (std::uint32_t line = 0; line < rows.lines; ++line) {
+    std::uint32_t used = 0;
+    for (std::size_t k = 0; k < packet.count; ++k) used |= places.valid[line][k];
+    const auto row = static_cast<float>(line % rows.rows);
+    for (; used != 0; used &= used - 1) {
+      const auto bit = static_cast<std::uint32_t>(std::countr_zero(used));
+      const auto column = static_cast<float>(line / rows.rows * SampleRows::kWord + bit);
+      const PlacedSamples::Bounds& b = places.bounds[line * SampleRows::kWord + bit];
       rows.least_offset = std::min(rows.least_offset, column - b.high_column);
       rows.most_offset = std::max(rows.most_offset, column - b.low_column);
-      rows.least_row_offset = std::min(rows.least_row_offset, line - b.high_row);
-      rows.most_row_offset = std::max(rows.most_row_offset, line - b.low_row);
+      rows.least_row_offset = std::min(rows.least_row_offset, row - b.high_row);
+      rows.most_row_offset = std::max(rows.most_row_offset, row - b.low_row);
       reach_row = std::max({reach_row, -b.low_row, b.high_row});
     }
   }

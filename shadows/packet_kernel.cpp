@@ -130,7 +130,9 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   FindPlaces();
   const auto in_packet = hn::RebindMask(du, hn::FirstN(d, count));
   for (std::uint32_t line = 0; line < rows_.lines; ++line)
-    hn::Store(hn::IfThenElseZero(in_packet, hn::Set(du, rows_.valid[line])), du, packet_.open[line]);
+    hn::Store(rows_.anywhere ? hn::Load(du, scratch_.places.valid[line])
+                             : hn::IfThenElseZero(in_packet, hn::Set(du, rows_.valid[line])),
+              du, packet_.open[line]);
   for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
   outline_.Begin();
   return FindOpenPart();
@@ -563,7 +565,7 @@ void PacketSolver::StoreMasks() {
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     std::uint64_t* mask = receivers_.mask(packet_.first + lane);
     for (std::uint32_t line = 0; line < rows_.lines; ++line) {
-      std::uint64_t blocked = rows_.valid[line] & ~packet_.open[line][lane];
+      std::uint64_t blocked = rows_.valid_of(Set(lane), line) & ~packet_.open[line][lane];
       if (blocked == 0) continue;
       if (rows_.anywhere) {
         const std::uint16_t* const sample = rows_.sample_of.data() + Set(lane) * rows_.stride + line * SampleRows::kWord;

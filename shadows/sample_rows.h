@@ -13,8 +13,8 @@ namespace halfshade {
 /// The picture has a word of 32 columns per line. Where there are more, a row takes several lines: line b * rows + j
 /// holds the columns from 32 b on of row j, and `offset` is less by 32 b there.
 ///
-/// Samples anywhere are sorted into rows by y and within each by x. A column is a rank then; the offsets still bound how
-/// far it lies off the samples' places, and these are kept one by one.
+/// Samples anywhere take the cells of a picture of more cells than samples, each one near to its place. These are kept
+/// one by one; the offsets bound how far any of them is off its cell.
 struct SampleRows {
   static constexpr std::uint32_t kWord = 32, kMaxColumns = 64, kMaxRows = 96;
   static constexpr std::uint32_t kMaxLines = kMaxRows * (kMaxColumns / kWord);
@@ -31,7 +31,7 @@ struct SampleRows {
   float reach_y = 0.0f;                          // max |y|
   float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
   std::vector<float> y, offset;                  // [set][line]; not for samples anywhere
-  std::vector<std::uint32_t> valid;              // [line]: bits of real samples
+  std::vector<std::uint32_t> valid;              // [line]: bits of real samples; anywhere: [set][line]
   std::vector<std::int32_t> first;               // [line]: bit i is sample first + i of the set
   std::uint32_t stride = 0;                      // of a set in the arrays that follow
   std::vector<float> point_x, point_y, point_z;  // [set][stride] the samples themselves, lattice, behind kRoom others;
@@ -48,9 +48,20 @@ struct SampleRows {
   };
   std::vector<Run> runs;  // [row]
 
-  /// Samples anywhere: place of a row's i-th sample in a set's arrays.
-  std::size_t slot(std::uint32_t row, std::uint32_t i) const {
-    return std::size_t{i / kWord * rows + row} * kWord + i % kWord;
+  std::uint32_t valid_of(std::size_t set, std::uint32_t line) const {
+    return valid[(anywhere ? set * lines : 0) + line];
+  }
+  /// The line that holds a cell, and for samples anywhere the cell's place in the arrays of a set.
+  std::uint32_t line_of(std::uint32_t row, std::uint32_t column) const { return column / kWord * rows + row; }
+  std::size_t slot(std::uint32_t row, std::uint32_t column) const {
+    return std::size_t{line_of(row, column)} * kWord + column % kWord;
+  }
+  bool holds(std::size_t set, std::uint32_t row, std::uint32_t column) const {
+    return (valid_of(set, line_of(row, column)) >> column % kWord & 1) != 0;
+  }
+  void make_room_for_points(std::size_t count);
+  void set_point(std::size_t at, const vec3& p) {
+    point_x[kRoom + at] = p.x, point_y[kRoom + at] = p.y, point_z[kRoom + at] = p.z;
   }
   /// Can outlines of groups of triangles be drawn into it?
   bool has_outlines() const { return anywhere || !place.empty(); }
@@ -59,6 +70,12 @@ struct SampleRows {
     return points.data() + kRoom + set * stride + first[line];
   }
 };
+
+/// No rows, and the memory of those that there were.
+SampleRows no_rows(SampleRows& rows, const LightFrame& frame);
+
+/// Samples of a plane that form no rows into `rows`, which are empty.
+void sort_samples_anywhere(const KernelSamples& samples, const LightFrame& frame, SampleRows& rows);
 
 /// Samples that lie in no plane, in a frame of the light: [set][KernelSamples::padded].
 struct SampleCloud {
