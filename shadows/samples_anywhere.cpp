@@ -41,9 +41,11 @@ void scale_cells(const dvec2& low, const dvec2& high, SampleRows& rows) {
   rows.scale = scale(rows.columns, high.x - low.x), rows.row_scale = scale(rows.rows, high.y - low.y);
 }
 
+/// Where the samples of a set lie, as far as finding cells for them goes.
+using SetPlaces = std::array<vec2, SampleRows::kMaxLines * SampleRows::kWord>;
+
 /// The samples of a set into its cells, by their places: rows by y, no more to a row than it has cells, and columns by x.
-template <class Place>
-void sort_set(std::uint32_t count, std::uint32_t set, const Place& place, const dvec2& low, SampleRows& rows) {
+void sort_set(std::uint32_t count, std::uint32_t set, const SetPlaces& place, const dvec2& low, SampleRows& rows) {
   std::array<std::uint16_t, SampleRows::kMaxLines * SampleRows::kWord> order;
   std::iota(order.begin(), order.begin() + count, std::uint16_t{0});
   std::sort(order.begin(), order.begin() + count, [&](auto a, auto b) { return place[a].y < place[b].y; });
@@ -98,22 +100,21 @@ void sort_samples_anywhere(const KernelSamples& samples, const LightFrame& frame
   rows.anywhere = true;
   divide_into_cells(samples.count, samples.sets, rows);
   clear_cells(samples.sets, rows);
-  std::vector<dvec3> places;
-  dvec3 low(HUGE_VAL), high(-HUGE_VAL);
-  for (const vec3& p : samples.points) {
-    places.push_back(frame.to_frame(dvec3(p)));
-    low = glm::min(low, places.back()), high = glm::max(high, places.back());
-  }
+  const auto place_of = [&](const vec3& point) { return dvec2(frame.to_frame(dvec3(point))); };
+  dvec2 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const vec3& p : samples.points) low = glm::min(low, place_of(p)), high = glm::max(high, place_of(p));
   scale_cells(low, high, rows);
   rows.reach_y = static_cast<float>(std::max(std::fabs(low.y), std::fabs(high.y)));
   rows.least_offset = rows.least_row_offset = 1e30f, rows.most_offset = rows.most_row_offset = -1e30f;
+  SetPlaces places;
   for (std::uint32_t set = 0; set < samples.sets; ++set) {
-    const dvec3* const place = places.data() + std::size_t{set} * samples.padded;
-    sort_set(samples.count, set, place, low, rows);
+    const std::span<const vec3> points = samples.set_points(set);
+    for (std::uint32_t i = 0; i < samples.count; ++i) places[i] = vec2(place_of(points[i]));
+    sort_set(samples.count, set, places, low, rows);
     place_set(
-        set, low, samples.set_points(set),
+        set, low, points,
         [&](std::size_t at, std::uint32_t row, std::uint32_t column, std::uint16_t sample) {
-          const dvec2 p = dvec2(place[sample]) * dvec2(rows.scale, rows.row_scale);
+          const dvec2 p = place_of(points[sample]) * dvec2(rows.scale, rows.row_scale);
           rows.column_of[at] = static_cast<float>(p.x), rows.row_of[at] = static_cast<float>(p.y);
           rows.least_offset = std::min(rows.least_offset, static_cast<float>(column - p.x));
           rows.most_offset = std::max(rows.most_offset, static_cast<float>(column - p.x));
@@ -122,7 +123,7 @@ void sort_samples_anywhere(const KernelSamples& samples, const LightFrame& frame
           const dvec3 error = glm::abs(dvec3(samples.center) +
                                        double{rows.column_of[at]} / double{rows.scale} * dvec3(rows.axis_x) +
                                        double{rows.row_of[at]} / double{rows.row_scale} * dvec3(rows.axis_y) -
-                                       dvec3(samples.set_points(set)[sample]));
+                                       dvec3(points[sample]));
           rows.deviation = std::max(rows.deviation, static_cast<float>(std::max({error.x, error.y, error.z}) * 1.001));
         },
         rows);
@@ -150,7 +151,6 @@ void arrange_cloud(const SampleCloud& cloud, const KernelSamples& samples, const
   rows.height_of.resize(rows.column_of.size());
   const auto of_set = [&](std::uint32_t set) { return cloud.place.data() + std::size_t{set} * samples.padded; };
   const auto see = [&](const vec3& l) { return vec2(l) + (vec2(l) - vec2(from)) * (l.z / (from.z - l.z)); };
-  std::array<vec2, SampleRows::kMaxLines * SampleRows::kWord> seen;
   vec2 low(1e30f), high(-1e30f);
   for (const std::uint32_t set : wanted) {
     for (std::uint32_t i = 0; i < samples.count; ++i) {
@@ -159,10 +159,11 @@ void arrange_cloud(const SampleCloud& cloud, const KernelSamples& samples, const
     }
   }
   scale_cells(low, high, rows);
+  SetPlaces places;
   for (const std::uint32_t set : wanted) {
-    for (std::uint32_t i = 0; i < samples.count; ++i) seen[i] = see(of_set(set)[i]);
+    for (std::uint32_t i = 0; i < samples.count; ++i) places[i] = see(of_set(set)[i]);
     std::fill_n(rows.height_of.begin() + std::ptrdiff_t{set} * rows.stride, rows.stride, 0.0f);
-    sort_set(samples.count, set, seen, low, rows);
+    sort_set(samples.count, set, places, low, rows);
     place_set(
         set, low, samples.set_points(set),
         [&](std::size_t at, std::uint32_t, std::uint32_t, std::uint16_t sample) {
