@@ -142,12 +142,16 @@ class TriangleAnywhere {
   Vec sign_[4], slope_[4], inside_[4], possible_[4];
 };
 
+/// Rounding of a sample's row, and of where an edge crosses it, in rows.
+constexpr float kRowRounding = 2e-5f;
+
 /// The edges as the receivers see them.
 ///
 /// Where the ends of edges are rounded, the same for all edges that they belong to, a sample that no edge comes nearer to
 /// than that is wound around as often as before. So only samples near to an edge are doubtful.
 HWY_INLINE void GroupOutline::SetAnywhere() {
   const Tag d;
+  const IntTag di;
   const Vec row_scale = hn::Set(d, rows_.row_scale), scale = hn::Set(d, rows_.scale), half = hn::Set(d, 0.5f);
   for (std::uint32_t e = 0; e < edges_.count; ++e) {
     const std::size_t a = edges_.from[e], b = edges_.to[e];
@@ -156,7 +160,7 @@ HWY_INLINE void GroupOutline::SetAnywhere() {
     const Vec dx = hn::Sub(xb, xa), dy = hn::Sub(yb, ya);
     const Vec error =
         hn::Add(hn::Max(hn::Load(d, vertices_.error[a]), hn::Load(d, vertices_.error[b])), hn::Set(d, rows_.deviation));
-    const Vec off = hn::MulAdd(error, row_scale, hn::Set(d, 1e-5f));  // in rows; samples are rounded, too
+    const Vec off = hn::MulAdd(error, row_scale, hn::Set(d, kRowRounding));
     const LaneMask level = hn::Le(hn::Abs(dy), hn::Mul(off, hn::Set(d, 4.0f)));
     const Vec slope = hn::IfThenZeroElse(level, hn::Mul(dx, Reciprocal(hn::IfThenElse(level, hn::Set(d, 1.0f), dy))));
     const Vec rounding = hn::MulAdd(hn::Add(hn::Abs(xa), hn::Abs(xb)), hn::Set(d, 0x1p-19f), hn::Set(d, 0x1p-15f));
@@ -164,12 +168,27 @@ HWY_INLINE void GroupOutline::SetAnywhere() {
     width = hn::Add(width, hn::IfThenElseZero(level, hn::Mul(hn::Abs(dx), half)));
     hn::Store(slope, d, edges_.slope[e]);
     hn::Store(width, d, edges_.width[e]);
-    hn::Store(hn::IfThenElse(level, hn::MulAdd(dx, half, xa), xa), d, edges_.column[e]);
-    hn::Store(hn::Sub(hn::Min(ya, yb), off), d, edges_.near_low[e]);
-    hn::Store(hn::Add(hn::Max(ya, yb), off), d, edges_.near_high[e]);
+    hn::Store(hn::IfThenElse(level, hn::MulAdd(dx, half, xa), hn::NegMulAdd(slope, ya, xa)), d, edges_.column[e]);
+    hn::Store(ya, d, edges_.end_row[0][e]);
+    hn::Store(yb, d, edges_.end_row[1][e]);
+    if (e < edges_.fixed) continue;
+    const LaneMask positive = LanesFromBits(edges_.turn[e] >> 16, 0), negative = LanesFromBits(edges_.turn[e], 0);
+    const auto turned = hn::IfThenElseZero(hn::RebindMask(di, negative), hn::Set(di, -1));
+    hn::Store(hn::IfThenElse(hn::RebindMask(di, positive), hn::Set(di, 1), turned), di, edges_.sign[e]);
   }
   for (std::uint32_t e = edges_.count; e % hn::Lanes(d) != 0; ++e)
     edges_.rows.low[e] = 1e30f, edges_.rows.high[e] = -1e30f;
+}
+
+/// The receivers for which a row passes between the ends of an edge, or nearly so.
+HWY_INLINE LaneMask GroupOutline::EndsNear(std::size_t e, Vec row) const {
+  const Tag d;
+  const Vec ya = hn::Load(d, edges_.end_row[0][e]), yb = hn::Load(d, edges_.end_row[1][e]);
+  const Vec error = hn::Add(hn::Max(hn::Load(d, vertices_.error[edges_.from[e]]),
+                                    hn::Load(d, vertices_.error[edges_.to[e]])),
+                            hn::Set(d, rows_.deviation));
+  const Vec off = hn::MulAdd(error, hn::Set(d, rows_.row_scale), hn::Set(d, kRowRounding));
+  return hn::And(hn::Ge(row, hn::Sub(hn::Min(ya, yb), off)), hn::Le(row, hn::Add(hn::Max(ya, yb), off)));
 }
 
 /// The receivers for which the outline winds around a sample, and those for which that is uncertain.
@@ -185,36 +204,51 @@ HWY_INLINE LaneMask GroupOutline::WindSample(std::size_t at, LaneMask& doubtful)
   const Vec low_column = hn::Set(d, bounds.low_column), high_column = hn::Set(d, bounds.high_column),
             low_row = hn::Set(d, bounds.low_row), high_row = hn::Set(d, bounds.high_row);
   auto around = hn::Zero(di);
-  const auto one = hn::Set(di, 1);
   doubtful = hn::Lt(low_row, low_row);
-  for (std::size_t first = 0; first < edges_.count; first += hn::Lanes(d)) {
-    const LaneMask level = hn::And(hn::Le(hn::Load(d, edges_.rows.low + first), high_row),
-                                   hn::Ge(hn::Load(d, edges_.rows.high + first), low_row));
-    const LaneMask reaches = hn::And(level, hn::Le(hn::Load(d, edges_.columns.low + first), high_column));
-    const std::uint64_t over = Bits(hn::Ge(hn::Load(d, edges_.columns.high + first), low_column));
-    for (std::uint64_t bits = Bits(reaches); bits != 0; bits &= bits - 1) {
-      const auto k = static_cast<std::size_t>(std::countr_zero(bits));
-      const std::size_t e = first + k;
-      const Vec ya = hn::Load(d, vertices_.row[edges_.from[e]]);
-      const LaneMask behind = hn::Le(ya, sample.row),
-                     before = hn::Le(hn::Load(d, vertices_.row[edges_.to[e]]), sample.row);
-      LaneMask down = hn::AndNot(behind, before), up = hn::AndNot(before, behind);
-      if (e >= edges_.fixed) Turn(e, down, up);
-      if ((over >> k & 1) != 0) {  // not beside it for all receivers
-        const Vec x =
-            hn::MulAdd(hn::Load(d, edges_.slope[e]), hn::Sub(sample.row, ya), hn::Load(d, edges_.column[e]));
-        const Vec beyond = hn::Sub(sample.column, x);
-        LaneMask near = hn::And(hn::Le(hn::Abs(beyond), hn::Load(d, edges_.width[e])),
-                                hn::And(hn::Ge(sample.row, hn::Load(d, edges_.near_low[e])),
-                                        hn::Le(sample.row, hn::Load(d, edges_.near_high[e]))));
-        if (e >= edges_.fixed) near = hn::And(near, Receivers(e));
-        doubtful = hn::Or(doubtful, near);
-        const LaneMask right = hn::Gt(beyond, hn::Zero(d));
-        down = hn::And(down, right), up = hn::And(up, right);
-      }
-      around = hn::Add(around, hn::IfThenElseZero(hn::RebindMask(di, down), one));
-      around = hn::Sub(around, hn::IfThenElseZero(hn::RebindMask(di, up), one));
+  const auto ends_behind = [&](std::size_t e, int end) HWY_ATTR {
+    return hn::Le(hn::Load(d, edges_.end_row[end][e]), sample.row);
+  };
+  using Signs = decltype(around);
+  const auto cross = [&](LaneMask to, LaneMask from, Signs sign) HWY_ATTR {
+    around = hn::IfThenElse(hn::RebindMask(di, to), hn::Add(around, sign), around);
+    around = hn::IfThenElse(hn::RebindMask(di, from), hn::Sub(around, sign), around);
+  };
+  const auto wind_beside = [&](std::uint64_t bits, std::size_t first, const auto& sign_of) HWY_ATTR {
+    for (; bits != 0; bits &= bits - 1) {
+      const std::size_t e = first + static_cast<std::size_t>(std::countr_zero(bits));
+      cross(ends_behind(e, 1), ends_behind(e, 0), sign_of(e));
     }
+  };
+  const auto wind_over = [&](std::uint64_t bits, std::size_t first, const auto& sign_of) HWY_ATTR {
+    for (; bits != 0; bits &= bits - 1) {
+      const std::size_t e = first + static_cast<std::size_t>(std::countr_zero(bits));
+      const Vec x = hn::MulAdd(hn::Load(d, edges_.slope[e]), sample.row, hn::Load(d, edges_.column[e]));
+      const Vec beyond = hn::Sub(sample.column, x);
+      const LaneMask right = hn::Gt(beyond, hn::Zero(d)),
+                     near = hn::Le(hn::Abs(beyond), hn::Load(d, edges_.width[e]));
+      const auto sign = sign_of(e);
+      if (!hn::AllFalse(d, near)) {
+        const LaneMask is_edge = hn::RebindMask(d, hn::Ne(sign, hn::Zero(di)));
+        doubtful = hn::Or(doubtful, hn::And(hn::And(near, is_edge), EndsNear(e, sample.row)));
+      }
+      cross(hn::And(right, ends_behind(e, 1)), hn::And(right, ends_behind(e, 0)), sign);
+    }
+  };
+  const auto one = hn::Set(di, 1);
+  const auto plus = [&](std::size_t) HWY_ATTR { return one; };
+  const auto turned = [&](std::size_t e) HWY_ATTR { return hn::Load(di, edges_.sign[e]); };
+  for (std::size_t first = 0; first < edges_.count; first += hn::Lanes(d)) {
+    const LaneMask on_row = hn::And(hn::Le(hn::Load(d, edges_.rows.low + first), high_row),
+                                    hn::Ge(hn::Load(d, edges_.rows.high + first), low_row));
+    const LaneMask reaches = hn::And(on_row, hn::Le(hn::Load(d, edges_.columns.low + first), high_column));
+    if (hn::AllFalse(d, reaches)) continue;
+    const std::uint64_t meet = Bits(reaches),
+                        over = Bits(hn::And(reaches, hn::Ge(hn::Load(d, edges_.columns.high + first), low_column))),
+                        beside = meet ^ over;
+    const std::uint64_t fixed =
+        first >= edges_.fixed ? 0 : ~std::uint64_t{0} >> (64 - std::min<std::size_t>(edges_.fixed - first, 64));
+    wind_over(over & fixed, first, plus), wind_beside(beside & fixed, first, plus);
+    wind_over(over & ~fixed, first, turned), wind_beside(beside & ~fixed, first, turned);
   }
   return hn::RebindMask(d, hn::Ne(around, hn::Zero(di)));
 }

@@ -34,8 +34,9 @@ struct OutlineEdges {
     alignas(HWY_MAX_BYTES) float low[kMost + 1], high[kMost + 1];
   };
   Boxes columns, rows;
-  // The column where the edge is at its first end, by receiver; rows between which it may pass near to a sample.
-  alignas(HWY_MAX_BYTES) float column[kMost][kMaxLanes], near_low[kMost][kMaxLanes], near_high[kMost][kMaxLanes];
+  // By receiver: the column where the edge's line crosses row 0, and the rows of its ends.
+  alignas(HWY_MAX_BYTES) float column[kMost][kMaxLanes], end_row[2][kMost][kMaxLanes];
+  alignas(HWY_MAX_BYTES) std::int32_t sign[kMost][kMaxLanes];  // 1, -1 where it runs against that, 0 where it is none
 };
 
 /// Triangles of one leaf of a group, as bits, as seen by a box of receivers.
@@ -183,6 +184,7 @@ class GroupOutline {
   // For samples anywhere (packet_anywhere-inl.h).
   HWY_INLINE void SetAnywhere();
   HWY_INLINE LaneMask WindSample(std::size_t at, LaneMask& doubtful) const;
+  HWY_INLINE LaneMask EndsNear(std::size_t e, Vec row) const;
 
  private:
   bool CollectEdges(std::uint32_t first, std::uint32_t end, const std::uint32_t* facing);
