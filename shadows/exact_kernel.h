@@ -19,7 +19,9 @@ struct PictureLines {
   static constexpr std::size_t kLanes = 16;
   static constexpr std::uint32_t kNothing = 0x100, kMixed = 0x101;
   alignas(64) float y[SampleRows::kMaxLines][kLanes], offset[SampleRows::kMaxLines][kLanes];
-  alignas(64) float rest[SampleRows::kMaxLines][kLanes];  // 31 - offset; both plus the half that rounds upwards
+  alignas(64) float rest[SampleRows::kMaxLines][kLanes];   // 31 - offset; both plus the half that rounds upwards
+  alignas(64) float row_place[SampleRows::kMaxLines][kLanes];  // SampleRows::place
+  alignas(64) float row_offset[kLanes];                    // SampleRows::row_offset
   std::uint32_t placed = kNothing;                        // the set of all lanes; see above
 
   /// For receivers of these sets; lanes beyond `count` are like the last.

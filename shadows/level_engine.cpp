@@ -155,8 +155,8 @@ LevelEngine::LevelEngine(const LatticeMesh& mesh, const ReceiverArray& receivers
                          const ShadowConfig& config, ShadowStats& stats)
     : mesh_(mesh), receivers_(receivers), light_(light), config_(config), stats_(stats) {
   const LightSamples first = make_sets(light, config, mesh.frame, {}, {});
-  flat_ = first.flat, rows_ = flat_ && has_row_sets(light);
-  if (!flat_ || mesh.triangles.empty()) return;
+  rows_ = first.flat && has_row_sets(light);
+  if (mesh.triangles.empty()) return;
   if (rows_) corners_ = region_corners(light, first, mesh.frame);
   Stopwatch watch;
   build_blocker_tree(mesh, tree_);
@@ -191,17 +191,9 @@ void LevelEngine::give_up_withdrawn_certificates() {
 
 void LevelEngine::solve(const LightSamples& samples, const ReceiverArray& part) {
   const std::uint64_t certified = stats_.certified_blockers;
-  if (flat_) {
-    const ExactBlockers blockers{mesh_, config_.back_face_casters ? &closed_ : nullptr, &tree_};
-    solve_exact(blockers, part, light_, samples, config_, kept_, work_, masks_, stats_);
-    give_up_withdrawn_certificates();
-  } else {
-    ShadowStats own;
-    solve_masks(mesh_, part, light_, samples, config_, masks_, own);
-    stats_.build_ms += own.build_ms, stats_.index_ms += own.index_ms;
-    stats_.cull_ms += own.cull_ms, stats_.test_ms += own.test_ms;
-    stats_.sample_tests += own.sample_tests, stats_.exact_fallbacks += own.exact_fallbacks;
-  }
+  const ExactBlockers blockers{mesh_, config_.back_face_casters ? &closed_ : nullptr, &tree_};
+  solve_exact(blockers, part, light_, samples, config_, kept_, work_, masks_, stats_);
+  give_up_withdrawn_certificates();
   if (certified != 0) stats_.certified_blockers = certified;  // counted with the first set
 }
 
@@ -211,7 +203,7 @@ void LevelEngine::solve_round(const SetShape& shape, const SetRound& round, std:
   if (mesh_.triangles.empty()) answers.assign(which.size(), {shape.size() * round.count, 0});
   if (mesh_.triangles.empty() || which.empty()) return;
   const LightSamples samples = make_sets(light_, config_, mesh_.frame, shape, round);
-  if (flat_) prepare(samples);
+  prepare(samples);
   std::vector<std::uint32_t> cell_of;  // [set][sample]
   for (const dvec2& st : samples.st) {
     cell_of.push_back(static_cast<std::uint32_t>(st.y * shape.rows) * shape.columns +

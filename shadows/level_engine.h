@@ -37,7 +37,6 @@ class LevelEngine {
   const ShadowConfig& config_;
   ShadowStats& stats_;
   bool rows_;
-  bool flat_;
   BlockerTree tree_;
   ClosedComponents closed_;
   ExactLight kept_;

@@ -639,8 +639,10 @@ void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::s
       const std::size_t at = std::size_t{set[std::min(lane, count - 1)]} * rows.lines + line;
       y[line][lane] = rows.y[at], offset[line][lane] = rows.offset[at] + 0.5f,
       rest[line][lane] = 31.5f - rows.offset[at];
+      row_place[line][lane] = rows.place.empty() ? 0.0f : rows.place[at];
     }
   }
+  for (std::size_t lane = 0; lane < kLanes; ++lane) row_offset[lane] = rows.row_offset[set[std::min(lane, count - 1)]];
   placed = alike ? set[0] : kMixed;
 }
 

@@ -202,7 +202,7 @@ class GroupOutline {
   }
   /// How far a row may lie off its place, in rows.
   float RowSpread() const {
-    return rows_.most_row_offset - rows_.least_row_offset + rows_.deviation * rows_.row_scale + 1e-5f;
+    return rows_.row_spread + rows_.deviation * rows_.row_scale + 1e-5f;
   }
 
   const ExactScene& scene_;
@@ -362,7 +362,7 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
 HWY_INLINE void GroupOutline::Set() {
   const Tag d;
   const Vec row_scale = hn::Set(d, rows_.row_scale);
-  const Vec row_offset = hn::Set(d, 0.5f * (rows_.least_row_offset + rows_.most_row_offset));
+  const Vec row_offset = hn::Load(d, packet_.lines->row_offset);
   const Vec spread = hn::Set(d, RowSpread());
   for (std::uint32_t row = 0; row < rows_.rows; ++row) {
     for (std::uint64_t& word : edges_.on_row[row]) word = 0;
@@ -451,7 +451,7 @@ struct WindingNumbers {
 HWY_INLINE hn::Vec<IntTag> GroupOutline::WindLeft(std::uint32_t line) const {
   const Tag d;
   const IntTag di;
-  const Vec y = hn::Set(d, rows_.place[line]);
+  const Vec y = hn::Load(d, packet_.lines->row_place[line]);
   auto around = hn::Zero(di);
   const auto one = hn::Set(di, 1);
   for (std::size_t word = 0; word < std::size(edges_.left_on_row[0]); ++word) {
@@ -486,7 +486,7 @@ HWY_INLINE UintVec GroupOutline::WindAround(std::uint32_t line, hn::Vec<IntTag> 
   const Tag d;
   const UintTag du;
   const PictureLines& l = *packet_.lines;
-  const Vec y = hn::Set(d, rows_.place[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
+  const Vec y = hn::Load(d, l.row_place[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
   const Vec shifter = hn::Set(d, 0x1p23f), half = hn::Set(d, 0.5f);
   const UintVec zero = hn::Zero(du), ones = hn::Set(du, ~0u), shifter_bits = hn::Set(du, 0x4b000000u);
   doubtful = zero;

@@ -11,7 +11,8 @@ namespace halfshade {
 SampleRows no_rows(SampleRows& rows, const LightFrame& frame) {
   SampleRows none;
   none.axis_x = vec3(frame.u), none.axis_y = vec3(frame.v);
-  none.place = emptied(rows.place), none.y = emptied(rows.y), none.offset = emptied(rows.offset);
+  none.place = emptied(rows.place), none.row_offset = emptied(rows.row_offset);
+  none.y = emptied(rows.y), none.offset = emptied(rows.offset);
   none.point_x = emptied(rows.point_x), none.point_y = emptied(rows.point_y), none.point_z = emptied(rows.point_z);
   none.valid = emptied(rows.valid), none.first = emptied(rows.first), none.runs = emptied(rows.runs);
   none.column_of = emptied(rows.column_of), none.row_of = emptied(rows.row_of);
@@ -87,16 +88,20 @@ void find_lines(SampleRows& rows) {
 bool space_rows(SampleRows& rows, std::uint32_t sets) {
   const double pitch = rows.rows > 1 ? (double{rows.y[rows.rows - 1]} - double{rows.y[0]}) / (rows.rows - 1.0) : 1.0;
   if (!(pitch > 1e-7)) return false;
-  double least = 1e30, most = -1e30;
+  double least = 1e30, most = -1e30, spread = 0.0;
   for (std::uint32_t set = 0; set < sets; ++set) {
+    double first = 1e30, last = -1e30;
     for (std::uint32_t row = 0; row < rows.rows; ++row) {
       const double offset = row - double{rows.y[std::size_t{set} * rows.lines + row]} / pitch;
-      least = std::min(least, offset), most = std::max(most, offset);
+      first = std::min(first, offset), last = std::max(last, offset);
     }
+    rows.row_offset.push_back(static_cast<float>(0.5 * (first + last)));
+    least = std::min(least, first), most = std::max(most, last), spread = std::max(spread, last - first);
   }
   rows.row_scale = static_cast<float>(1.0 / pitch);
   rows.least_row_offset = static_cast<float>(least), rows.most_row_offset = static_cast<float>(most);
-  if (sets == 1 && most - least < 1e-3) {
+  rows.row_spread = static_cast<float>(spread);
+  if (spread < 1e-3) {
     for (const float y : rows.y) rows.place.push_back(y * rows.row_scale);
   }
   return most - least < 2.0;

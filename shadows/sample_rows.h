@@ -26,8 +26,10 @@ struct SampleRows {
   float least_offset = 0.0f, most_offset = 0.0f;  // over all rows (not lines)
   /// Row j lies between (j - most_row_offset) / row_scale and (j - least_row_offset) / row_scale, in all sets.
   float row_scale = 1.0f, least_row_offset = 0.0f, most_row_offset = 0.0f;
-  /// Line l lies at row place[l] of a picture in which y is row_scale y; rows of a single set that are evenly spaced.
-  std::vector<float> place;
+  /// Where the rows of each set are evenly spaced: line l of a set lies at row place[set][l] of a picture in which y is
+  /// row_scale y, and that is row j - row_offset[set], up to `row_spread`. Else none.
+  std::vector<float> place, row_offset;
+  float row_spread = 0.0f;
   float reach_y = 0.0f;                          // max |y|
   float deviation = 0.0f;                        // max |coordinate| between a sample and its place by the formula above
   std::vector<float> y, offset;                  // [set][line]; not for samples anywhere

@@ -1,5 +1,4 @@
-// Connected surfaces, fine and bumpy, with receivers on them and any rectangle or disk as light: what outlines of
-// patches, certificates of closed meshes and shared bounds of neighbouring receivers are for, and where they have been
+// Connected surfaces, fine and bumpy, with receivers on them and any light: what outlines of patches, certificates of closed meshes and shared bounds of neighbouring receivers are for, and where they have been
 // wrong.
 #include <doctest/doctest.h>
 
@@ -112,11 +111,69 @@ Case make_case(std::uint64_t seed) {
   return c;
 }
 
+/// Points around the light's centre: anywhere in a ball, in a few clumps, on a line, or all but a few in one place.
+std::vector<dvec3> sample_points(Random& random, const dvec3& center, double size) {
+  const int kind = pick(random, 4), count = 1 + pick(random, 300);
+  const dvec3 axis = random.in_box(-1.0, 1.0);
+  std::vector<dvec3> points;
+  for (int i = 0; i < count; ++i) {
+    const dvec3 p = random.in_box(-0.5, 0.5);
+    const double along = random.uniform(-0.5, 0.5);
+    switch (kind) {
+      case 0:
+        points.push_back(center + size * p);
+        break;
+      case 1:
+        points.push_back(center + size * (axis * (static_cast<double>(i % 3) - 1.0) + 0.02 * p));
+        break;
+      case 2:
+        points.push_back(center + size * along * axis);
+        break;
+      default:
+        points.push_back(i < 4 ? center + size * p : center);
+    }
+  }
+  return points;
+}
+
+/// A light of any shape and pattern instead.
+void change_light(std::uint64_t seed, Case& c) {
+  Random random(seed ^ 0x5a5a);
+  constexpr SamplePattern kPatterns[] = {SamplePattern::kRows, SamplePattern::kStratified,
+                                         SamplePattern::kLowDiscrepancy, SamplePattern::kPoissonDisk};
+  c.config.pattern = kPatterns[pick(random, 4)];
+  c.config.light_sample_count = std::min<std::uint32_t>(c.config.light_sample_count, 1 + pick(random, 400));
+  Light& light = c.light;
+  const double size = glm::length(light.u);
+  switch (pick(random, 6)) {
+    case 0:
+      light.shape = LightShape::kSphere, light.radius = size / 2.0;
+      break;
+    case 1:
+      light.shape = LightShape::kEllipsoid;
+      light.axes = {0.5 * light.u, 0.5 * light.v, random.uniform(0.01, 1.0) * glm::cross(light.u, light.v) / size};
+      break;
+    case 2:
+      light.shape = LightShape::kSamples, light.points = sample_points(random, light.center, size);
+      break;
+    case 3:
+      light.shape = LightShape::kPoint;
+      break;
+    case 4:
+      light.shape = LightShape::kDisk, light.radius = size / 2.0;
+      c.config.rotate_sets = pick(random, 2) == 0;
+      break;
+    default:
+      break;  // the rectangle
+  }
+}
+
 /// `every`: all exact methods on one case of so many, method exact on all.
-void check_cases(std::uint64_t first, std::uint64_t count, std::uint64_t every) {
+void check_cases(std::uint64_t first, std::uint64_t count, std::uint64_t every, bool any_light) {
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     CAPTURE(seed);
-    const Case c = make_case(seed);
+    Case c = make_case(seed);
+    if (any_light) change_light(seed, c);
     const Scene scene = scene_of(c.triangles);
     if (seed % every == 0) {
       CHECK(wrong_bits_of_exact_methods(scene, c.receivers, c.light, c.config) == 0);
@@ -129,6 +186,10 @@ void check_cases(std::uint64_t first, std::uint64_t count, std::uint64_t every) 
 
 }  // namespace
 
-TEST_CASE("random surfaces: the oracle's bits") { check_cases(0, 16, 8); }
+TEST_CASE("random surfaces: the oracle's bits") { check_cases(0, 16, 8, false); }
 
-TEST_CASE("random surfaces long: the oracle's bits") { check_cases(1000, 800, 8); }
+TEST_CASE("random surfaces: the oracle's bits before lights of any shape") { check_cases(0, 24, 12, true); }
+
+TEST_CASE("random surfaces long: the oracle's bits") { check_cases(1000, 800, 8, false); }
+
+TEST_CASE("random surfaces long: the oracle's bits before lights of any shape") { check_cases(1000, 800, 8, true); }
