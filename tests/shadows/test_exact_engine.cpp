@@ -170,6 +170,133 @@ TEST_CASE("disks of any number of samples have rows, and give the oracle's bits"
   }
 }
 
+TEST_CASE("samples that form no rows take a cell each, and rows, columns and offsets bound where they lie") {
+  Light light = frame_light();
+  Random random(9);
+  for (int i = 0; i < 200; ++i) light.points.push_back(light.center + (i < 60 ? 0.01 : 1.0) * random.in_box(-1.0, 1.0));
+  for (const LightShape shape : {LightShape::kRectangle, LightShape::kDisk}) {
+    for (const SamplePattern pattern :
+         {SamplePattern::kStratified, SamplePattern::kLowDiscrepancy, SamplePattern::kPoissonDisk}) {
+      for (const std::uint32_t count : {17u, 256u, 2150u, 4096u}) {
+        for (const std::uint32_t sets : {1u, 3u}) {
+          CAPTURE(count);
+          CAPTURE(sets);
+          light.shape = shape, light.radius = 1.2, light.normal = {0.1, -1.0, 0.3};
+          ShadowConfig config = frame_config(count);
+          config.pattern = pattern, config.sample_sets = sets;
+          const LightSamples samples =
+              make_light_samples(light, config, make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, {}));
+          ExactLight kept;
+          prepare_exact_light(light, samples, kept);
+          const SampleRows& rows = kept.rows;
+          REQUIRE(rows.anywhere);
+          CHECK(rows.rows <= SampleRows::kMaxRows);
+          CHECK(rows.columns <= SampleRows::kMaxColumns);
+          for (std::uint32_t set = 0; set < sets; ++set) {
+            std::vector<bool> seen(count, false);
+            for (std::uint32_t row = 0; row < rows.rows; ++row) {
+              for (std::uint32_t column = 0; column < rows.columns; ++column) {
+                if (!rows.holds(set, row, column)) continue;
+                const std::size_t at = set * rows.stride + rows.slot(row, column);
+                const std::uint16_t sample = rows.sample_of[at];
+                REQUIRE(sample < count);
+                REQUIRE(!seen[sample]);
+                seen[sample] = true;
+                const dvec3 p = kept.front.to_frame(dvec3(samples.set(set)[sample]));
+                const double x = p.x * double{rows.scale}, y = p.y * double{rows.row_scale};
+                REQUIRE(std::fabs(x - double{rows.column_of[at]}) <= 1e-4);
+                REQUIRE(std::fabs(y - double{rows.row_of[at]}) <= 1e-4);
+                REQUIRE(column - x >= double{rows.least_offset} - 1e-4);
+                REQUIRE(column - x <= double{rows.most_offset} + 1e-4);
+                REQUIRE(row - y >= double{rows.least_row_offset} - 1e-4);
+                REQUIRE(row - y <= double{rows.most_row_offset} + 1e-4);
+              }
+            }
+            CHECK(std::count(seen.begin(), seen.end(), true) == static_cast<std::ptrdiff_t>(count));
+          }
+          // Cells are near to the samples: no picture of ranks alone.
+          if (count == 256 && shape == LightShape::kRectangle && pattern != SamplePattern::kPoissonDisk)
+            CHECK(rows.most_offset - rows.least_offset < 6.0f);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("lights without a plane give the oracle's bits to receivers all around, near to them and between their samples") {
+  const std::vector<Triangle> some = random_triangles(31, 500);
+  Random random(32);
+  Light light = frame_light();
+  light.center = {0.3, 0.4, -0.2}, light.radius = 0.9;
+  light.axes = {dvec3(1.2, 0.3, 0.0), dvec3(-0.1, 0.5, 0.2), dvec3(0.0, -0.02, 0.05)};
+  std::vector<dvec3> points;
+  for (int i = 0; i < 500; ++i) {
+    const dvec3 way = glm::normalize(random.in_box(-1.0, 1.0) + dvec3(1e-3));
+    points.push_back(light.center + way * (i % 5 == 0 ? random.uniform(0.0, 1.1) : random.uniform(1.0, 5.0)));
+  }
+  for (int i = 0; i < 200; ++i) light.points.push_back(light.center + (i % 2 ? 0.9 : 0.05) * random.in_box(-1.0, 1.0));
+  // And triangles that end between the samples.
+  std::vector<Triangle> triangles = some;
+  for (int i = 0; i < 60; ++i) {
+    const dvec3 c = light.center + random.in_box(-1.0, 1.0);
+    triangles.push_back({c, c + random.in_box(-0.5, 0.5), c + random.in_box(-3.0, 3.0)});
+  }
+  const Scene scene = scene_of(triangles);
+  for (const LightShape shape :
+       {LightShape::kSphere, LightShape::kEllipsoid, LightShape::kSamples, LightShape::kPoint}) {
+    for (const std::uint32_t sets : {1u, 4u}) {
+      CAPTURE(static_cast<int>(shape));
+      CAPTURE(sets);
+      light.shape = shape;
+      ShadowConfig config = frame_config(sets == 1 ? 300 : 64);
+      config.sample_sets = sets, config.rotate_sets = sets > 1;
+      const VisibilityMasks truth = solve(scene, receivers_at(points), light, config, ShadowMethod::kOracle);
+      std::uint64_t blocked = 0;
+      for (const std::uint64_t word : truth.words) blocked += static_cast<std::uint64_t>(std::popcount(word));
+      CHECK(blocked > 50);
+      CHECK(wrong_bits(solve(scene, receivers_at(points), light, config, ShadowMethod::kExact), truth) == 0);
+    }
+  }
+}
+
+TEST_CASE("outlines of a bumpy surface give the oracle's bits for samples anywhere, in a plane or not") {
+  for (const std::uint64_t seed : {3, 4}) {
+    CAPTURE(seed);
+    Random random(seed);
+    constexpr int kSide = 40;
+    std::vector<std::vector<dvec3>> p(kSide + 1, std::vector<dvec3>(kSide + 1));
+    for (int i = 0; i <= kSide; ++i) {
+      for (int j = 0; j <= kSide; ++j) {
+        const double x = 4.0 * i / kSide - 2.0, z = 4.0 * j / kSide - 2.0;
+        p[i][j] = {x, 0.8 * std::sin(2.1 * x + static_cast<double>(seed)) * std::cos(1.7 * z), z};
+      }
+    }
+    const std::vector<Triangle> triangles = sheet(p);
+    std::vector<Receiver> receivers;
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      const auto& [a, b, c] = triangles[t];
+      receivers.push_back({(a + b + c) / 3.0 + dvec3(0.0, t % 2 ? 1e-4 : -1e-4, 0.0), t});
+    }
+    const Scene scene = scene_of(triangles);
+    Light light = frame_light();
+    light.center = {1.5, 2.5, -1.5}, light.normal = glm::cross(light.u, light.v), light.radius = 1.0;
+    light.two_sided = true;
+    for (const LightShape shape : {LightShape::kRectangle, LightShape::kDisk, LightShape::kSphere}) {
+      for (const std::uint32_t sets : {1u, 5u}) {
+        CAPTURE(static_cast<int>(shape));
+        CAPTURE(sets);
+        light.shape = shape;
+        ShadowConfig config = frame_config(100);
+        config.pattern = SamplePattern::kLowDiscrepancy, config.sample_sets = sets;
+        ShadowStats stats;
+        const VisibilityMasks masks = solve(scene, receivers, light, config, ShadowMethod::kExact, &stats);
+        CHECK(wrong_bits(masks, solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
+        CHECK(stats.pairs_sampled * 3 < stats.pairs_tested);  // not triangle by triangle
+      }
+    }
+  }
+}
+
 TEST_CASE(
     "outlines of a bumpy surface give the oracle's bits to receivers on it, before a light that is tilted and wide") {
   // Packets whose box reaches farther to one side of its middle than to the other: turned towards the light, the middle
