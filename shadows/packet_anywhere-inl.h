@@ -19,6 +19,7 @@ namespace HWY_NAMESPACE {
 struct SamplePlace {
   Vec column, row;
 
+  SamplePlace() = default;
   SamplePlace(const PlacedSamples& places, std::size_t at) {
     const Tag d;
     if (places.column != nullptr) {

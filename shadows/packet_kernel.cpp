@@ -11,8 +11,7 @@
 #define HWY_TARGET_INCLUDE "shadows/packet_kernel.cpp"
 #include <hwy/foreach_target.h>
 
-#include "shadows/alpha_lookup-inl.h"
-#include "shadows/packet_anywhere-inl.h"
+#include "shadows/packet_texels-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace halfshade {
@@ -76,7 +75,8 @@ class PacketSolver {
   HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
                             LaneMask below, LaneMask active);
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
-  void Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible, std::uint32_t* inside);
+  UintVec Settle(const PacketTriangle& triangle, std::uint32_t line, UintVec possible, UintVec inside);
+  UintVec OpaqueOf(const AlphaTriangle& alpha, std::uint32_t line, UintVec inside);
 
   vec3 Position(std::size_t lane) const {
     const std::size_t i = packet_.first + lane;
@@ -107,7 +107,10 @@ class PacketSolver {
   std::uint32_t viewed_ = 0;                      // those that are there
   GroupOutline outline_;                          // of the patch at work
   ProjectedVertices vertices_;                    // of the leaf at work
-  std::optional<TexelLookup> texels_[kMaxLanes];  // of the perforated triangle at work, made when first needed
+  const AlphaTriangle* texels_of_ = nullptr;       // the perforated triangle that these belong to:
+  PacketTexels texels_;                            // where `has_texels_`
+  bool has_texels_ = false;
+  std::optional<TexelLookup> lookups_[kMaxLanes];  // made when first needed
 };
 
 /// Positions, boxes and pictures; all samples are open.
@@ -115,6 +118,7 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   const Tag d;
   const UintTag du;
   packet_.first = first, packet_.count = count;
+  texels_of_ = nullptr;
   static_cast<ReceiverBox&>(packet_) = ReceiverBox();
   for (std::size_t i = 0; i < count; ++i) packet_.add(scene_.frame, Position(i));
   packet_.position = {hn::LoadU(d, &receivers_.x[first]), hn::LoadU(d, &receivers_.y[first]),
@@ -464,24 +468,50 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
   return below;
 }
 
-/// Doubtful and perforated samples of a line; `possible` and `inside` are per receiver.
-void PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, const std::uint32_t* possible,
-                          std::uint32_t* inside) {
-  const auto& [a, b, c] = triangle.corner;
-  for (std::size_t lane = 0; lane < packet_.count; ++lane) {
-    if (possible[lane] == 0) continue;
-    const LinePoints points = PointsOf(lane, line);
-    for (std::uint32_t doubtful = possible[lane] & ~inside[lane]; doubtful != 0; doubtful &= doubtful - 1) {
-      const auto bit = static_cast<std::size_t>(std::countr_zero(doubtful));
-      ++counters_.exact_fallbacks;
-      inside[lane] |= std::uint32_t{blocks(a, b, c, Position(lane), points[bit])} << bit;
+/// The samples of a line that the triangle blocks, of those that it may block and those that it certainly meets.
+UintVec PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, UintVec possible, UintVec inside) {
+  const UintTag du;
+  const UintVec doubtful = hn::AndNot(inside, possible);
+  if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
+    const auto& [a, b, c] = triangle.corner;
+    alignas(HWY_MAX_BYTES) std::uint32_t in_doubt[kMaxLanes], does[kMaxLanes];
+    hn::Store(doubtful, du, in_doubt), hn::Store(inside, du, does);
+    for (std::size_t lane = 0; lane < packet_.count; ++lane) {
+      if (in_doubt[lane] == 0) continue;
+      const LinePoints points = PointsOf(lane, line);
+      for (std::uint32_t rest = in_doubt[lane]; rest != 0; rest &= rest - 1) {
+        const auto bit = static_cast<std::size_t>(std::countr_zero(rest));
+        ++counters_.exact_fallbacks;
+        does[lane] |= std::uint32_t{blocks(a, b, c, Position(lane), points[bit])} << bit;
+      }
     }
-    if (triangle.alpha == nullptr || inside[lane] == 0) continue;
-    const AlphaTriangle& alpha = *triangle.alpha;
-    if (!texels_[lane]) texels_[lane].emplace(alpha, Position(lane));
-    inside[lane] = OpaqueSamples(alpha, *texels_[lane], Position(lane), points.x, points.y, points.z, inside[lane],
-                                 counters_.exact_fallbacks);
+    inside = hn::Load(du, does);
   }
+  const bool none = hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)));
+  return triangle.alpha == nullptr || none ? inside : OpaqueOf(*triangle.alpha, line, inside);
+}
+
+/// Of a line's samples, all blocked by the triangle, those that meet an opaque texel of it.
+UintVec PacketSolver::OpaqueOf(const AlphaTriangle& alpha, std::uint32_t line, UintVec inside) {
+  const UintTag du;
+  if (texels_of_ != &alpha) {
+    texels_of_ = &alpha;
+    has_texels_ = texels_.Set(rows_, scene_.samples->center, packet_, alpha);
+    std::fill(std::begin(lookups_), std::end(lookups_), std::nullopt);
+  }
+  UintVec opaque = hn::Zero(du), open = inside;
+  if (has_texels_) opaque = texels_.Opaque(rows_, packet_, line, inside, open);
+  if (hn::AllTrue(du, hn::Eq(open, hn::Zero(du)))) return opaque;
+  alignas(HWY_MAX_BYTES) std::uint32_t asked[kMaxLanes], is[kMaxLanes];
+  hn::Store(open, du, asked), hn::Store(opaque, du, is);
+  for (std::size_t lane = 0; lane < packet_.count; ++lane) {
+    if (asked[lane] == 0) continue;
+    const LinePoints points = PointsOf(lane, line);
+    if (!lookups_[lane]) lookups_[lane].emplace(alpha, Position(lane));
+    is[lane] |= OpaqueSamples(alpha, *lookups_[lane], Position(lane), points.x, points.y, points.z, asked[lane],
+                              counters_.exact_fallbacks);
+  }
+  return hn::Load(du, is);
 }
 
 HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
@@ -505,10 +535,7 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
     inside = hn::And(asked, rows_.anywhere ? inside : outline.inside(y, offset, rest));
     if (triangle.cuts_cloud) inside = hn::Zero(du);
     if (triangle.alpha != nullptr || !hn::AllTrue(du, hn::Eq(possible, inside))) {
-      alignas(HWY_MAX_BYTES) std::uint32_t may[kMaxLanes], does[kMaxLanes];
-      hn::Store(possible, du, may), hn::Store(inside, du, does);
-      Settle(triangle, line, may, does);
-      inside = hn::Load(du, does);
+      inside = Settle(triangle, line, possible, inside);
       if (hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)))) return;
     }
     hn::Store(hn::AndNot(inside, open), du, packet_.open[line]);
@@ -543,7 +570,6 @@ bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, st
   if (hn::AllFalse(d, active)) return false;
   PacketTriangle triangle;
   triangle.alpha = (leaf.perforated >> lane & 1) != 0 ? &scene_.fit->alpha_of(*scene_.tree, index, lane) : nullptr;
-  if (triangle.alpha != nullptr) std::fill(std::begin(texels_), std::end(texels_), std::nullopt);
   for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = leaf.corner_at(k, lane);
   triangle.plane = leaf.plane_at(lane);
   triangle.samples_above = fit.samples_above >> lane & 1, triangle.samples_below = fit.samples_below >> lane & 1;
