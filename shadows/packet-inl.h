@@ -46,6 +46,8 @@ struct ReceiverBox {
 /// Receivers [first, first + count), a lane each; lanes beyond repeat the last one and have nothing open.
 struct Packet : ReceiverBox {
   std::size_t first = 0, count = 0;
+  const std::uint8_t* set = nullptr;  // of each receiver
+  bool has_one_set = true;
   Vec3 position, to_center;       // lattice; from there to the light's centre
   Vec distance;                   // bound on |coordinate| of receiver to sample
   Vec height_error, place_error;  // 5 |r - c| / height + 14; 5 |r - c|: see PlaceVertex

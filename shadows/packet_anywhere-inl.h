@@ -30,13 +30,11 @@ struct SamplePlace {
   }
 };
 
-/// The samples of a packet's receivers, which belong to these sets. Where they differ between receivers: in their sets,
-/// or because they are a cloud (`is_cloud`). A sample l of that is seen from r at l + (l - r) k with k = l_z / (r_z - l_z).
-HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const std::uint8_t* set, const Packet& packet,
-                             PlacedSamples& places) {
+/// The samples of a packet's receivers. Where they differ between receivers: in their sets, or because they are a cloud (`is_cloud`). A sample l of that is seen from r at l + (l - r) k with k = l_z / (r_z - l_z).
+HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const Packet& packet, PlacedSamples& places) {
   const Tag d;
+  const std::uint8_t* const set = packet.set;
   const std::size_t first = std::size_t{set[0]} * rows.stride;
-  const bool alike = std::all_of(set, set + packet.count, [&](std::uint8_t s) { return s == set[0]; });
   places.column = places.row = nullptr;
   std::uint32_t used[kMaxLines];
   for (std::uint32_t line = 0; line < rows.lines; ++line) {
@@ -46,7 +44,7 @@ HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const std::u
       used[line] |= places.valid[line][k];
     }
   }
-  if (alike && !is_cloud) {
+  if (packet.has_one_set && !is_cloud) {
     places.column = rows.column_of.data() + first, places.row = rows.row_of.data() + first;
     return;
   }
@@ -62,7 +60,7 @@ HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const std::u
     for (std::uint32_t bits = used[line]; bits != 0; bits &= bits - 1) {
       const std::size_t at = line * SampleRows::kWord + static_cast<std::size_t>(std::countr_zero(bits));
       const auto of_lanes = [&](const std::vector<float>& values) HWY_ATTR {
-        if (alike) return hn::Set(d, values[first + at]);
+        if (packet.has_one_set) return hn::Set(d, values[first + at]);
         alignas(HWY_MAX_BYTES) float value[kMaxLanes];
         for (std::size_t k = 0; k < hn::Lanes(d); ++k)
           value[k] = values[std::size_t{set[std::min(k, packet.count - 1)]} * rows.stride + at];

@@ -75,23 +75,23 @@ class PacketSolver {
   HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
                             LaneMask below, LaneMask active);
   HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
-  UintVec Settle(const PacketTriangle& triangle, std::uint32_t line, UintVec possible, UintVec inside);
-  UintVec OpaqueOf(const AlphaTriangle& alpha, std::uint32_t line, UintVec inside);
+  UintVec Settle(const PacketTriangle& triangle, const PictureRange& range, std::uint32_t line, UintVec possible,
+                 UintVec inside);
+  UintVec OpaqueOf(const AlphaTriangle& alpha, const PictureRange& range, std::uint32_t line, UintVec inside);
 
   vec3 Position(std::size_t lane) const {
     const std::size_t i = packet_.first + lane;
     return {receivers_.x[i], receivers_.y[i], receivers_.z[i]};
   }
 
-  std::uint8_t Set(std::size_t lane) const { return receivers_.set[packet_.first + lane]; }
   /// The samples of a line that a receiver is asked for, by bit.
   struct LinePoints {
     const float *x, *y, *z;
     vec3 operator[](std::size_t bit) const { return {x[bit], y[bit], z[bit]}; }
   };
   LinePoints PointsOf(std::size_t lane, std::uint32_t line) const {
-    return {rows_.line_points(rows_.point_x, Set(lane), line), rows_.line_points(rows_.point_y, Set(lane), line),
-            rows_.line_points(rows_.point_z, Set(lane), line)};
+    return {rows_.line_points(rows_.point_x, packet_.set[lane], line), rows_.line_points(rows_.point_y, packet_.set[lane], line),
+            rows_.line_points(rows_.point_z, packet_.set[lane], line)};
   }
 
   const ExactScene& scene_;
@@ -118,6 +118,9 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   const Tag d;
   const UintTag du;
   packet_.first = first, packet_.count = count;
+  packet_.set = receivers_.set.data() + first;
+  packet_.has_one_set =
+      std::all_of(packet_.set, packet_.set + count, [&](std::uint8_t s) { return s == packet_.set[0]; });
   texels_of_ = nullptr;
   static_cast<ReceiverBox&>(packet_) = ReceiverBox();
   for (std::size_t i = 0; i < count; ++i) packet_.add(scene_.frame, Position(i));
@@ -145,13 +148,12 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
 /// Where the receivers see their samples.
 void PacketSolver::FindPlaces() {
   const Tag d;
-  const std::uint8_t* const set = receivers_.set.data() + packet_.first;
   packet_.lines = &scratch_.lines, packet_.places = &scratch_.places;
   float reach = scene_.samples->reach;
   if (rows_.anywhere) {
-    PlaceSamples(rows_, scene_.cloud != nullptr, set, packet_, scratch_.places);
+    PlaceSamples(rows_, scene_.cloud != nullptr, packet_, scratch_.places);
   } else {
-    scratch_.lines.place(rows_, set, packet_.count);
+    scratch_.lines.place(rows_, packet_.set, packet_.count);
   }
   if (scene_.cloud != nullptr) {
     BoundPlaces(*scene_.cloud, packet_, scratch_.places, scratch_.rows);
@@ -469,7 +471,8 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
 }
 
 /// The samples of a line that the triangle blocks, of those that it may block and those that it certainly meets.
-UintVec PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line, UintVec possible, UintVec inside) {
+UintVec PacketSolver::Settle(const PacketTriangle& triangle, const PictureRange& range, std::uint32_t line,
+                             UintVec possible, UintVec inside) {
   const UintTag du;
   const UintVec doubtful = hn::AndNot(inside, possible);
   if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
@@ -488,19 +491,20 @@ UintVec PacketSolver::Settle(const PacketTriangle& triangle, std::uint32_t line,
     inside = hn::Load(du, does);
   }
   const bool none = hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)));
-  return triangle.alpha == nullptr || none ? inside : OpaqueOf(*triangle.alpha, line, inside);
+  return triangle.alpha == nullptr || none ? inside : OpaqueOf(*triangle.alpha, range, line, inside);
 }
 
 /// Of a line's samples, all blocked by the triangle, those that meet an opaque texel of it.
-UintVec PacketSolver::OpaqueOf(const AlphaTriangle& alpha, std::uint32_t line, UintVec inside) {
+UintVec PacketSolver::OpaqueOf(const AlphaTriangle& alpha, const PictureRange& range, std::uint32_t line,
+                               UintVec inside) {
   const UintTag du;
   if (texels_of_ != &alpha) {
     texels_of_ = &alpha;
-    has_texels_ = texels_.Set(rows_, scene_.samples->center, packet_, alpha);
+    has_texels_ = texels_.Set(scene_, packet_, alpha, range);
     std::fill(std::begin(lookups_), std::end(lookups_), std::nullopt);
   }
   UintVec opaque = hn::Zero(du), open = inside;
-  if (has_texels_) opaque = texels_.Opaque(rows_, packet_, line, inside, open);
+  if (has_texels_) opaque = texels_.Opaque(line, inside, open);
   if (hn::AllTrue(du, hn::Eq(open, hn::Zero(du)))) return opaque;
   alignas(HWY_MAX_BYTES) std::uint32_t asked[kMaxLanes], is[kMaxLanes];
   hn::Store(open, du, asked), hn::Store(opaque, du, is);
@@ -535,7 +539,7 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
     inside = hn::And(asked, rows_.anywhere ? inside : outline.inside(y, offset, rest));
     if (triangle.cuts_cloud) inside = hn::Zero(du);
     if (triangle.alpha != nullptr || !hn::AllTrue(du, hn::Eq(possible, inside))) {
-      inside = Settle(triangle, line, possible, inside);
+      inside = Settle(triangle, range, line, possible, inside);
       if (hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)))) return;
     }
     hn::Store(hn::AndNot(inside, open), du, packet_.open[line]);
@@ -591,10 +595,10 @@ void PacketSolver::StoreMasks() {
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     std::uint64_t* mask = receivers_.mask(packet_.first + lane);
     for (std::uint32_t line = 0; line < rows_.lines; ++line) {
-      std::uint64_t blocked = rows_.valid_of(Set(lane), line) & ~packet_.open[line][lane];
+      std::uint64_t blocked = rows_.valid_of(packet_.set[lane], line) & ~packet_.open[line][lane];
       if (blocked == 0) continue;
       if (rows_.anywhere) {
-        const std::uint16_t* const sample = rows_.sample_of.data() + Set(lane) * rows_.stride + line * SampleRows::kWord;
+        const std::uint16_t* const sample = rows_.sample_of.data() + packet_.set[lane] * rows_.stride + line * SampleRows::kWord;
         for (; blocked != 0; blocked &= blocked - 1) {
           const std::uint16_t s = sample[std::countr_zero(blocked)];
           mask[s / 64] |= std::uint64_t{1} << s % 64;

@@ -21,48 +21,111 @@ namespace HWY_NAMESPACE {
 
 class PacketTexels {
  public:
-  /// For receivers of the packet before that triangle; false where texels cannot be numbered by 31 bits.
-  bool Set(const SampleRows& rows, const vec3& center, const Packet& packet, const AlphaTriangle& triangle);
+  /// For receivers of the packet before a triangle that they see within `range`; false where texels cannot be numbered
+  /// by 31 bits.
+  bool Set(const ExactScene& scene, const Packet& packet, const AlphaTriangle& triangle, const PictureRange& range);
 
   /// Of the samples `asked` of a line, one word for each receiver and all blocked by the triangle, those whose texel is
   /// opaque; `open` are those that are not decided.
-  HWY_INLINE UintVec Opaque(const SampleRows& rows, const Packet& packet, std::uint32_t line, UintVec asked,
-                            UintVec& open);
+  HWY_INLINE UintVec Opaque(std::uint32_t line, UintVec asked, UintVec& open);
 
  private:
-  /// A function of the place in columns and rows, a double for each receiver.
+  /// Columns and rows from the light's centre; of a cloud, whose samples are not projected here, lengths above its plane.
+  using Place = std::array<Vec, 3>;
+  /// A function of the place, a double for each receiver.
   struct Linear {
-    alignas(HWY_MAX_BYTES) double at_center[kMaxLanes], by_column[kMaxLanes], by_row[kMaxLanes];
+    alignas(HWY_MAX_BYTES) double at_center[kMaxLanes], by[3][kMaxLanes];
   };
   /// The same around the place of reference, with the sign that makes the denominator positive there.
   struct Step {
-    Vec at, by_column, by_row;
-    HWY_INLINE Vec operator()(Vec column, Vec row) const {
-      return hn::MulAdd(by_column, column, hn::MulAdd(by_row, row, at));
+    Vec at, by[3];
+    HWY_INLINE Vec operator()(const Place& away, bool is_cloud) const {
+      const Vec v = hn::MulAdd(by[0], away[0], hn::MulAdd(by[1], away[1], at));
+      return is_cloud ? hn::MulAdd(by[2], away[2], v) : v;
     }
-    HWY_INLINE Vec reach(Vec columns, Vec rows) const {
-      return hn::MulAdd(hn::Abs(by_column), columns, hn::MulAdd(hn::Abs(by_row), rows, hn::Abs(at)));
+    /// Of |the function| where the place is within `away` of the reference.
+    HWY_INLINE Vec Reach(const Place& away) const {
+      return hn::MulAdd(hn::Abs(by[0]), away[0],
+                        hn::MulAdd(hn::Abs(by[1]), away[1], hn::MulAdd(hn::Abs(by[2]), away[2], hn::Abs(at))));
     }
   };
   using IntVec = hn::Vec<IntTag>;
-  HWY_INLINE void Refer(Vec column, Vec row);
-  HWY_INLINE IntVec Texel(int axis, Vec place, LaneMask& certain) const;
+  void FindPlanes();
+  HWY_INLINE Place PlaceOf(std::uint32_t line, std::uint32_t i) const;
+  void Refer(const Place& place, const Place& away);
+  void ReferToLine(std::uint32_t line, std::uint32_t any);
+  template <bool kWraps>
+  HWY_INLINE IntVec Texel(int axis, Vec floor) const;
+  template <bool kWraps>
+  HWY_INLINE UintVec Lookup(std::uint32_t line, std::uint32_t any, UintVec& known) const;
 
+  const ExactScene* scene_ = nullptr;
+  const Packet* packet_ = nullptr;
   const AlphaTriangle* triangle_ = nullptr;
   Linear coordinate_[2], sum_;  // numerators of u and v, in texels; denominator
   double most_[2];              // |coordinate| of the corners, in texels
-  // What is uncertain of a numerator, beside `sum_error_` for each texel from zero, and of the denominator.
-  alignas(HWY_MAX_BYTES) float error_[2][kMaxLanes], sum_error_[kMaxLanes];
-  Step step_[2], sum_step_;  // Refer
-  IntVec first_[2];          // the whole numbers, wrapped into the texture
-  Vec margin_[2];            // of a line: nearer than that to a texel's border the texel is open
+  alignas(HWY_MAX_BYTES) float rounding_[kMaxLanes];  // of the denominator; of a numerator for each texel of `most_`
+  float off_place_ = 0.0f;                            // samples lie so far off their places, along any axis
+  // Since Refer:
+  bool for_line_ = false;  // the samples of a line alone
+  Place reference_;
+  Step step_[2], sum_step_;
+  IntVec first_[2];           // the whole numbers, wrapped into the texture
+  LaneMask is_good_, wraps_;  // receivers for which float is enough, for which texels may lie beyond the border
+  Vec most_off_;  // from the middle of a texel, along either axis: farther away the texel is open
 };
 
-bool PacketTexels::Set(const SampleRows& rows, const vec3& center, const Packet& packet,
-                       const AlphaTriangle& triangle) {
-  triangle_ = &triangle;
+bool PacketTexels::Set(const ExactScene& scene, const Packet& packet, const AlphaTriangle& triangle,
+                       const PictureRange& range) {
+  scene_ = &scene, packet_ = &packet, triangle_ = &triangle;
   const std::size_t size = std::size_t{triangle.width} * triangle.height;
   if (size < 4 || size >= std::size_t{1} << 31) return false;
+  FindPlanes();
+  for_line_ = scene.cloud != nullptr;  // whose samples in a range may lie far apart
+  if (for_line_) return true;
+  const Tag d;
+  const SampleRows& rows = *scene.rows;
+  const vec2 low(static_cast<float>(range.first_column) - rows.most_offset,
+                 static_cast<float>(range.first_row) - rows.most_row_offset),
+      high(static_cast<float>(range.last_column) - rows.least_offset,
+           static_cast<float>(range.last_row) - rows.least_row_offset),
+      middle = 0.5f * (low + high), away = 0.5f * (high - low) + 0.1f;
+  Refer({hn::Set(d, middle.x), hn::Set(d, middle.y), hn::Zero(d)},
+        {hn::Set(d, away.x), hn::Set(d, away.y), hn::Zero(d)});
+  return true;
+}
+
+/// Of each receiver's sample i of a line.
+HWY_INLINE PacketTexels::Place PacketTexels::PlaceOf(std::uint32_t line, std::uint32_t i) const {
+  const Tag d;
+  const SampleRows& rows = *scene_->rows;
+  const std::size_t at = line * SampleRows::kWord + i;
+  if (!rows.anywhere) {
+    const PictureLines& l = *packet_->lines;
+    return {hn::Sub(hn::Set(d, static_cast<float>(i) + 0.5f), hn::Load(d, l.offset[line])),
+            hn::Mul(hn::Load(d, l.y[line]), hn::Set(d, rows.row_scale)), hn::Zero(d)};
+  }
+  if (scene_->cloud == nullptr) {
+    const SamplePlace p(*packet_->places, at);
+    return {p.column, p.row, hn::Zero(d)};
+  }
+  if (packet_->has_one_set) {
+    const std::size_t from = std::size_t{packet_->set[0]} * rows.stride + at;
+    return {hn::Set(d, rows.column_of[from]), hn::Set(d, rows.row_of[from]), hn::Set(d, rows.height_of[from])};
+  }
+  alignas(HWY_MAX_BYTES) float place[3][kMaxLanes];
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+    const std::size_t from = std::size_t{packet_->set[std::min(lane, packet_->count - 1)]} * rows.stride + at;
+    place[0][lane] = rows.column_of[from], place[1][lane] = rows.row_of[from], place[2][lane] = rows.height_of[from];
+  }
+  return {hn::Load(d, place[0]), hn::Load(d, place[1]), hn::Load(d, place[2])};
+}
+
+/// The three functions, and how far off they may be.
+void PacketTexels::FindPlanes() {
+  const SampleRows& rows = *scene_->rows;
+  const vec3& center = scene_->samples->center;
+  const AlphaTriangle& triangle = *triangle_;
   const WideTag d;
   const NarrowTag narrow;
   const Tag df;
@@ -75,7 +138,13 @@ bool PacketTexels::Set(const SampleRows& rows, const vec3& center, const Packet&
   const auto norm1 = [&](const Wide3& a) HWY_ATTR { return hn::Add(hn::Abs(a.x), hn::Add(hn::Abs(a.y), hn::Abs(a.z))); };
   const auto splat = [&](const dvec3& a) HWY_ATTR { return Wide3{hn::Set(d, a.x), hn::Set(d, a.y), hn::Set(d, a.z)}; };
   const Wide3 by_column = splat(dvec3(rows.axis_x) / double{rows.scale}),
-              by_row = splat(dvec3(rows.axis_y) / double{rows.row_scale});
+              by_row = splat(dvec3(rows.axis_y) / double{rows.row_scale}), by_height = splat(scene_->frame.n);
+  // Samples of a cloud are at their own places, rounded.
+  off_place_ = 1.75f * rows.deviation;
+  if (scene_->cloud != nullptr) {
+    const vec3 reach = glm::max(glm::abs(scene_->cloud->low), glm::abs(scene_->cloud->high));
+    off_place_ = 0x1p-23f * (reach.x + reach.y + reach.z);
+  }
   double texel[3][2];
   most_[0] = most_[1] = 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -84,8 +153,8 @@ bool PacketTexels::Set(const SampleRows& rows, const vec3& center, const Packet&
     for (int k = 0; k < 2; ++k) most_[k] = std::max(most_[k], std::fabs(texel[i][k]) + 1.0);
   }
   alignas(HWY_MAX_BYTES) float position[3][kMaxLanes];
-  hn::Store(packet.position.x, df, position[0]), hn::Store(packet.position.y, df, position[1]);
-  hn::Store(packet.position.z, df, position[2]);
+  hn::Store(packet_->position.x, df, position[0]), hn::Store(packet_->position.y, df, position[1]);
+  hn::Store(packet_->position.z, df, position[2]);
   for (std::size_t lane = 0; lane < hn::Lanes(df); lane += hn::Lanes(d)) {
     const auto coordinate = [&](int axis) HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(narrow, position[axis] + lane)); };
     const Wide3 r{coordinate(0), coordinate(1), coordinate(2)};
@@ -113,152 +182,154 @@ bool PacketTexels::Set(const SampleRows& rows, const vec3& center, const Packet&
     }
     const auto store = [&](const Wide3& p, Linear& to) HWY_ATTR {
       hn::Store(dot(p, to_center), d, to.at_center + lane);
-      hn::Store(dot(p, by_column), d, to.by_column + lane), hn::Store(dot(p, by_row), d, to.by_row + lane);
+      hn::Store(dot(p, by_column), d, to.by[0] + lane), hn::Store(dot(p, by_row), d, to.by[1] + lane);
+      hn::Store(dot(p, by_height), d, to.by[2] + lane);
     };
     store(sum, sum_);
-    // As in TexelLookup, with four times as many units of 2^-53 for the steps that come here; and samples lie off their
-    // places by `deviation`.
+    // As in TexelLookup, with four times as many units of 2^-53 for the steps that come here.
     const double picture = rows.columns / double{rows.scale} + rows.rows / double{rows.row_scale};
     const Wide away = hn::Add(norm1(to_center), hn::Set(d, 4.0 * (picture + 1.0)));
     const Wide rounding = hn::Mul(hn::Set(d, 64.0 * 0x1p-53), hn::Mul(size_of, away));
-    const Wide deviation = hn::Set(d, 3.0 * double{rows.deviation});
-    const auto as_float = [&](Wide v) HWY_ATTR { return hn::DemoteTo(narrow, hn::Mul(v, hn::Set(d, 1.0001))); };
-    for (int k = 0; k < 2; ++k) {
-      store(plane[k], coordinate_[k]);
-      const Wide off = hn::MulAdd(deviation, norm1(plane[k]), hn::Mul(rounding, hn::Set(d, most_[k])));
-      hn::StoreU(as_float(off), narrow, error_[k] + lane);
-    }
-    hn::StoreU(as_float(hn::MulAdd(deviation, norm1(sum), rounding)), narrow, sum_error_ + lane);
+    for (int k = 0; k < 2; ++k) store(plane[k], coordinate_[k]);
+    hn::StoreU(hn::DemoteTo(narrow, rounding), narrow, rounding_ + lane);
   }
-  return true;
 }
 
-/// Takes the place of reference.
-HWY_INLINE void PacketTexels::Refer(Vec column, Vec row) {
+/// Takes a place of reference for samples that lie within `away` of it.
+void PacketTexels::Refer(const Place& reference, const Place& away) {
   const WideTag d;
   const NarrowTag narrow;
   const Tag df;
   const IntTag di;
-  alignas(HWY_MAX_BYTES) float place[2][kMaxLanes], numerator[2][3][kMaxLanes], denominator[3][kMaxLanes];
+  reference_ = reference;
+  alignas(HWY_MAX_BYTES) float place[3][kMaxLanes], numerator[2][4][kMaxLanes], denominator[4][kMaxLanes];
   alignas(HWY_MAX_BYTES) float whole[2][kMaxLanes];
-  hn::Store(column, df, place[0]), hn::Store(row, df, place[1]);
+  for (int k = 0; k < 3; ++k) hn::Store(reference[k], df, place[k]);
   for (std::size_t lane = 0; lane < hn::Lanes(df); lane += hn::Lanes(d)) {
-    const Wide x = hn::PromoteTo(d, hn::LoadU(narrow, place[0] + lane)),
-               y = hn::PromoteTo(d, hn::LoadU(narrow, place[1] + lane));
-    const auto at = [&](const Linear& f) HWY_ATTR {
-      return hn::MulAdd(hn::Load(d, f.by_column + lane), x,
-                        hn::MulAdd(hn::Load(d, f.by_row + lane), y, hn::Load(d, f.at_center + lane)));
+    Wide at[3];
+    for (int k = 0; k < 3; ++k) at[k] = hn::PromoteTo(d, hn::LoadU(narrow, place[k] + lane));
+    const auto value = [&](const Linear& f) HWY_ATTR {
+      Wide v = hn::Load(d, f.at_center + lane);
+      for (int k = 0; k < 3; ++k) v = hn::MulAdd(hn::Load(d, f.by[k] + lane), at[k], v);
+      return v;
     };
-    const Wide s = at(sum_), sx = hn::Load(d, sum_.by_column + lane), sy = hn::Load(d, sum_.by_row + lane);
-    const Wide sign = hn::CopySignToAbs(hn::Set(d, 1.0), s), inverse = hn::Div(hn::Set(d, 1.0), s);
-    const auto store = [&](Wide v, float* to) HWY_ATTR { hn::StoreU(hn::DemoteTo(narrow, v), narrow, to + lane); };
-    store(hn::Mul(s, sign), denominator[0]), store(hn::Mul(sx, sign), denominator[1]);
-    store(hn::Mul(sy, sign), denominator[2]);
-    for (int k = 0; k < 2; ++k) {
-      const Linear& f = coordinate_[k];
-      const Wide u = at(f), ratio = hn::Mul(u, inverse);
-      const Wide m = hn::IfThenElseZero(hn::Lt(hn::Abs(ratio), hn::Set(d, most_[k])), hn::Floor(ratio));
-      store(hn::Mul(hn::NegMulAdd(m, s, u), sign), numerator[k][0]);
-      store(hn::Mul(hn::NegMulAdd(m, sx, hn::Load(d, f.by_column + lane)), sign), numerator[k][1]);
-      store(hn::Mul(hn::NegMulAdd(m, sy, hn::Load(d, f.by_row + lane)), sign), numerator[k][2]);
-      store(Wrap(m, k == 0 ? triangle_->width : triangle_->height), whole[k]);
+    const Wide s = value(sum_), sign = hn::CopySignToAbs(hn::Set(d, 1.0), s), inverse = hn::Div(hn::Set(d, 1.0), s);
+    const auto store = [&](Wide v, float* to) HWY_ATTR {
+      hn::StoreU(hn::DemoteTo(narrow, hn::Mul(v, sign)), narrow, to + lane);
+    };
+    store(s, denominator[0]);
+    for (int k = 0; k < 3; ++k) store(hn::Load(d, sum_.by[k] + lane), denominator[k + 1]);
+    for (int axis = 0; axis < 2; ++axis) {
+      const Linear& f = coordinate_[axis];
+      const Wide u = value(f), ratio = hn::Mul(u, inverse);
+      const Wide m = hn::IfThenElseZero(hn::Lt(hn::Abs(ratio), hn::Set(d, most_[axis])), hn::Floor(ratio));
+      store(hn::NegMulAdd(m, s, u), numerator[axis][0]);
+      for (int k = 0; k < 3; ++k)
+        store(hn::NegMulAdd(m, hn::Load(d, sum_.by[k] + lane), hn::Load(d, f.by[k] + lane)), numerator[axis][k + 1]);
+      const Wide wrapped = Wrap(m, axis == 0 ? triangle_->width : triangle_->height);
+      hn::StoreU(hn::DemoteTo(narrow, wrapped), narrow, whole[axis] + lane);
     }
   }
   const auto step_of = [&](const float(*v)[kMaxLanes]) HWY_ATTR {
-    return Step{hn::Load(df, v[0]), hn::Load(df, v[1]), hn::Load(df, v[2])};
+    return Step{hn::Load(df, v[0]), {hn::Load(df, v[1]), hn::Load(df, v[2]), hn::Load(df, v[3])}};
   };
   sum_step_ = step_of(denominator);
+  // In units of 2^-24: a numerator is within 6 of its reach, the denominator as well, the ratio within 12 of itself. A
+  // step in columns or rows is a difference of two places, which are rounded at 2^-24 of 64.
+  const Vec units = hn::Set(df, 6.0f * 0x1p-24f);
+  const SampleRows& rows = *scene_->rows;
+  const Vec place_error[3] = {hn::Set(df, 64.0f * 0x1p-23f + off_place_ * rows.scale),
+                              hn::Set(df, 64.0f * 0x1p-23f + off_place_ * rows.row_scale), hn::Set(df, off_place_)};
+  const auto moved = [&](const Step& s) HWY_ATTR {
+    return hn::MulAdd(hn::Abs(s.by[0]), place_error[0],
+                      hn::MulAdd(hn::Abs(s.by[1]), place_error[1], hn::Mul(hn::Abs(s.by[2]), place_error[2])));
+  };
+  const Vec rounding = hn::Load(df, rounding_), sum_reach = sum_step_.Reach(away);
+  const Vec off_sum = hn::MulAdd(units, sum_reach, hn::Add(rounding, moved(sum_step_)));
+  // The least that the denominator may be.
+  const Vec least = hn::Sub(hn::Sub(hn::Add(sum_step_.at, sum_step_.at), sum_reach), off_sum);
+  const LaneMask positive = hn::Gt(least, hn::Zero(df));
+  const Vec inverse_least = hn::Div(hn::Set(df, 1.0f), hn::IfThenElse(positive, least, hn::Set(df, 1e-20f)));
+  Vec margin = hn::Zero(df);
+  wraps_ = hn::Lt(margin, margin);
   for (int k = 0; k < 2; ++k) {
     step_[k] = step_of(numerator[k]);
-    first_[k] = hn::ConvertTo(di, hn::Load(df, whole[k]));
+    const Vec first = hn::Load(df, whole[k]), reach = step_[k].Reach(away), ratio = hn::Mul(reach, inverse_least);
+    first_[k] = hn::ConvertTo(di, first);
+    const Vec off = hn::MulAdd(units, reach, hn::MulAdd(hn::Set(df, static_cast<float>(2.0001 * most_[k])), rounding,
+                                                        moved(step_[k])));
+    const Vec relative = hn::MulAdd(off_sum, inverse_least, hn::Add(units, units));
+    margin = hn::Max(margin, hn::Mul(hn::MulAdd(off, inverse_least, hn::Mul(ratio, relative)), hn::Set(df, 1.001f)));
+    const float size = static_cast<float>(k == 0 ? triangle_->width : triangle_->height);
+    const Vec far = hn::Add(ratio, hn::Set(df, 2.0f));
+    wraps_ = hn::Or(wraps_, hn::Or(hn::Lt(hn::Sub(first, far), hn::Zero(df)),
+                                   hn::Ge(hn::Add(first, far), hn::Set(df, size))));
+    // Texels that are wrapped lie at most one texture away.
+    is_good_ = k == 0 ? hn::Lt(far, hn::Set(df, size)) : hn::And(is_good_, hn::Lt(far, hn::Set(df, size)));
   }
+  // A narrower reference might leave less open.
+  const float most_margin = for_line_ ? 0.4f : 1.0f / 128.0f;
+  is_good_ = hn::And(hn::And(is_good_, positive), hn::Lt(margin, hn::Set(df, most_margin)));
+  most_off_ = hn::Sub(hn::Set(df, 0.5f - 1e-6f), margin);
 }
 
-/// The number of the column or row of texels at `place` from the whole number of reference.
-HWY_INLINE hn::Vec<IntTag> PacketTexels::Texel(int axis, Vec place, LaneMask& certain) const {
-  const Tag d;
+/// The column or row of texels from the whole number of reference.
+template <bool kWraps>
+HWY_INLINE hn::Vec<IntTag> PacketTexels::Texel(int axis, Vec floor) const {
   const IntTag di;
-  const auto size = static_cast<std::int32_t>(axis == 0 ? triangle_->width : triangle_->height);
-  const Vec floor = hn::Floor(place), in_texel = hn::Sub(place, floor);
-  const Vec border = hn::Min(in_texel, hn::Sub(hn::Set(d, 1.0f), in_texel));
-  certain = hn::And(hn::Gt(border, margin_[axis]), hn::Lt(hn::Abs(floor), hn::Set(d, static_cast<float>(size))));
-  const auto all = hn::Set(di, size);
-  auto texel = hn::Add(hn::ConvertTo(di, hn::IfThenElseZero(certain, floor)), first_[axis]);
-  texel = hn::IfThenElse(hn::Lt(texel, hn::Zero(di)), hn::Add(texel, all), texel);
-  return hn::IfThenElse(hn::Lt(texel, all), texel, hn::Sub(texel, all));
+  const auto texel = hn::Add(hn::ConvertTo(di, floor), first_[axis]);
+  if (!kWraps) return texel;
+  const auto size = hn::Set(di, static_cast<std::int32_t>(axis == 0 ? triangle_->width : triangle_->height));
+  const auto from_zero = hn::IfThenElse(hn::Lt(texel, hn::Zero(di)), hn::Add(texel, size), texel);
+  return hn::IfThenElse(hn::Lt(from_zero, size), from_zero, hn::Sub(from_zero, size));
 }
 
-HWY_INLINE UintVec PacketTexels::Opaque(const SampleRows& rows, const Packet& packet, std::uint32_t line, UintVec asked,
-                                        UintVec& open) {
+/// Opaque samples of `any`, for all receivers; `known` are those whose texel is certain.
+template <bool kWraps>
+HWY_INLINE UintVec PacketTexels::Lookup(std::uint32_t line, std::uint32_t any, UintVec& known) const {
   const Tag d;
   const UintTag du;
   const IntTag di;
-  alignas(HWY_MAX_BYTES) std::uint32_t word[kMaxLanes];
-  hn::Store(asked, du, word);
-  std::uint32_t any = 0;
-  for (std::size_t k = 0; k < hn::Lanes(d); ++k) any |= word[k];
-  const auto place_of = [&](std::uint32_t i) HWY_ATTR {
-    if (rows.anywhere) return SamplePlace(*packet.places, line * SampleRows::kWord + i);
-    SamplePlace place;
-    const PictureLines& l = *packet.lines;
-    place.column = hn::Sub(hn::Set(d, static_cast<float>(i) + 0.5f), hn::Load(d, l.offset[line]));
-    place.row = hn::Mul(hn::Load(d, l.y[line]), hn::Set(d, rows.row_scale));
-    return place;
-  };
-  const auto first = static_cast<std::uint32_t>(std::countr_zero(any)),
-             last = 31u - static_cast<std::uint32_t>(std::countl_zero(any));
-  SamplePlace reference = place_of((first + last) / 2);
-  if (rows.anywhere && (any >> (first + last) / 2 & 1) == 0) reference = place_of(first);
-  Refer(reference.column, reference.row);
-  // How far the samples lie from there.
-  Vec columns = hn::Zero(d), rows_off = columns;
-  for (std::uint32_t rest = any; rest != 0; rest &= rest - 1) {
-    if (!rows.anywhere && (rest != any && (rest & (rest - 1)) != 0)) continue;  // the first and the last
-    const SamplePlace p = place_of(static_cast<std::uint32_t>(std::countr_zero(rest)));
-    columns = hn::Max(columns, hn::Abs(hn::Sub(p.column, reference.column)));
-    rows_off = hn::Max(rows_off, hn::Abs(hn::Sub(p.row, reference.row)));
-  }
-  // In units of 2^-24: a numerator is within 4 of its reach, the denominator as well, the ratio within 8 of itself. A
-  // step in columns or rows is a difference of two places, which are rounded at 2^-24 of 64.
-  const Vec unit = hn::Set(d, 0x1p-24f), place_error = hn::Set(d, 64.0f * 0x1p-23f);
-  const Vec sum_error = hn::Load(d, sum_error_);
-  const auto moved = [&](const Step& s) HWY_ATTR {
-    return hn::Mul(place_error, hn::Add(hn::Abs(s.by_column), hn::Abs(s.by_row)));
-  };
-  const Vec sum_reach = sum_step_.reach(columns, rows_off);
-  const Vec off_sum = hn::MulAdd(hn::Mul(unit, hn::Set(d, 4.0f)), sum_reach, hn::Add(sum_error, moved(sum_step_)));
-  // The least that the denominator may be.
-  const Vec least = hn::Sub(hn::Sub(hn::Add(sum_step_.at, sum_step_.at), sum_reach), off_sum);
-  const LaneMask positive = hn::Gt(least, hn::Zero(d));
-  const Vec inverse_least = hn::Div(hn::Set(d, 1.0f), hn::IfThenElse(positive, least, hn::Set(d, 1e-20f)));
-  for (int k = 0; k < 2; ++k) {
-    const Vec reach = step_[k].reach(columns, rows_off);
-    const Vec off = hn::Add(hn::MulAdd(hn::Mul(unit, hn::Set(d, 4.0f)), reach, moved(step_[k])),
-                            hn::MulAdd(hn::Set(d, static_cast<float>(most_[k] * 1.0001)), sum_error,
-                                       hn::Load(d, error_[k])));
-    const Vec ratio = hn::Mul(reach, inverse_least);
-    margin_[k] = hn::MulAdd(off, inverse_least,
-                            hn::Mul(ratio, hn::MulAdd(off_sum, inverse_least, hn::Mul(unit, hn::Set(d, 12.0f)))));
-    margin_[k] = hn::Mul(margin_[k], hn::Set(d, 1.001f));
-  }
-  UintVec opaque = hn::Zero(du), known = opaque;
+  const bool in_rows = !scene_->rows->anywhere, is_cloud = scene_->cloud != nullptr;
+  const auto first = static_cast<std::uint32_t>(std::countr_zero(any));
   const auto* const alpha = reinterpret_cast<const std::int32_t*>(triangle_->map->alpha.data());
   const auto width = hn::Set(di, static_cast<std::int32_t>(triangle_->width)),
              top = hn::Set(di, static_cast<std::int32_t>(triangle_->height) - 1);
   const auto most_clear = hn::Set(di, static_cast<std::int32_t>(triangle_->threshold) - 1);
+  const Vec half = hn::Set(d, 0.5f);
+  Vec numerator[2], denominator;
+  const auto step_to = [&](const Place& place) HWY_ATTR {
+    const Place away{hn::Sub(place[0], reference_[0]), hn::Sub(place[1], reference_[1]),
+                     hn::Sub(place[2], reference_[2])};
+    for (int k = 0; k < 2; ++k) numerator[k] = step_[k](away, is_cloud);
+    denominator = sum_step_(away, is_cloud);
+  };
+  step_to(PlaceOf(line, first));
+  const Vec at_first[3] = {numerator[0], numerator[1], denominator};
+  UintVec opaque = hn::Zero(du);
+  known = opaque;
   for (; any != 0; any &= any - 1) {
     const UintVec bit = hn::Set(du, any & (0u - any));
-    const SamplePlace p = place_of(static_cast<std::uint32_t>(std::countr_zero(any)));
-    const Vec column = hn::Sub(p.column, reference.column), row = hn::Sub(p.row, reference.row);
-    const Vec inverse = Reciprocal(sum_step_(column, row));
-    LaneMask certain_u, certain_v;
-    const auto u = Texel(0, hn::Mul(step_[0](column, row), inverse), certain_u),
-               v = Texel(1, hn::Mul(step_[1](column, row), inverse), certain_v);
-    const LaneMask certain = hn::And(positive, hn::And(certain_u, certain_v));
-    const auto at = hn::Add(hn::Mul(hn::Sub(top, v), width), u);
+    const auto i = static_cast<std::uint32_t>(std::countr_zero(any));
+    if (in_rows) {
+      const Vec columns = hn::Set(d, static_cast<float>(i - first));
+      for (int k = 0; k < 2; ++k) numerator[k] = hn::MulAdd(step_[k].by[0], columns, at_first[k]);
+      denominator = hn::MulAdd(sum_step_.by[0], columns, at_first[2]);
+    } else if (i != first) {
+      step_to(PlaceOf(line, i));
+    }
+    const Vec inverse = Reciprocal(denominator);
+    const Vec u = hn::Mul(numerator[0], inverse), v = hn::Mul(numerator[1], inverse);
+    const Vec floor_u = hn::Floor(u), floor_v = hn::Floor(v);
+    const Vec off = hn::Max(hn::Abs(hn::Sub(hn::Sub(u, floor_u), half)), hn::Abs(hn::Sub(hn::Sub(v, floor_v), half)));
+    const LaneMask certain = hn::And(is_good_, hn::Lt(off, most_off_));
+    const auto column = Texel<kWraps>(0, hn::IfThenElseZero(certain, floor_u)),
+               row = hn::Sub(top, Texel<kWraps>(1, hn::IfThenElseZero(certain, floor_v)));
+    const auto at = hn::Add(hn::Mul(row, width), column);
     // The byte is the last of a word of four, or is in the first word.
-    const auto word_at = hn::IfThenElseZero(hn::RebindMask(di, certain), hn::Max(hn::Sub(at, hn::Set(di, 3)), hn::Zero(di)));
-    const UintVec four = hn::BitCast(du, hn::GatherOffset(di, alpha, word_at));
+    const auto word_at = hn::Max(hn::Sub(at, hn::Set(di, 3)), hn::Zero(di));
+    const UintVec four = hn::BitCast(
+        du, hn::GatherOffset(di, alpha, hn::IfThenElseZero(hn::RebindMask(di, certain), word_at)));
     const UintVec shift = hn::ShiftLeft<3>(hn::BitCast(du, hn::Sub(at, word_at)));
     const auto byte =
         hn::BitCast(di, hn::And(hn::Shr(four, hn::And(shift, hn::Set(du, 31u))), hn::Set(du, 0xffu)));
@@ -266,8 +337,41 @@ HWY_INLINE UintVec PacketTexels::Opaque(const SampleRows& rows, const Packet& pa
     known = hn::Or(known, sure);
     opaque = hn::Or(opaque, hn::IfThenElseZero(hn::RebindMask(du, hn::Gt(byte, most_clear)), sure));
   }
+  return opaque;
+}
+
+HWY_INLINE UintVec PacketTexels::Opaque(std::uint32_t line, UintVec asked, UintVec& open) {
+  const Tag d;
+  const UintTag du;
+  alignas(HWY_MAX_BYTES) std::uint32_t word[kMaxLanes];
+  hn::Store(asked, du, word);
+  std::uint32_t any = 0;
+  for (std::size_t k = 0; k < hn::Lanes(d); ++k) any |= word[k];
+  const LaneMask asking = hn::RebindMask(d, hn::Ne(asked, hn::Zero(du)));
+  if (for_line_ || !hn::AllFalse(d, hn::AndNot(is_good_, asking))) {
+    // One place of reference is not enough for all of the triangle.
+    for_line_ = true;
+    ReferToLine(line, any);
+  }
+  UintVec known;
+  const UintVec opaque = hn::AllFalse(d, hn::And(wraps_, asking)) ? Lookup<false>(line, any, known)
+                                                                  : Lookup<true>(line, any, known);
   open = hn::AndNot(known, asked);
   return hn::And(opaque, asked);
+}
+
+/// The middle one of a line's samples as reference.
+void PacketTexels::ReferToLine(std::uint32_t line, std::uint32_t any) {
+  const Tag d;
+  std::uint32_t behind = any;  // from the middle one on
+  for (int k = std::popcount(any) / 2; k > 0; --k) behind &= behind - 1;
+  const Place reference = PlaceOf(line, static_cast<std::uint32_t>(std::countr_zero(behind)));
+  Place away{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  for (; any != 0; any &= any - 1) {
+    const Place p = PlaceOf(line, static_cast<std::uint32_t>(std::countr_zero(any)));
+    for (int k = 0; k < 3; ++k) away[k] = hn::Max(away[k], hn::Abs(hn::Sub(p[k], reference[k])));
+  }
+  Refer(reference, away);
 }
 
 }  // namespace HWY_NAMESPACE
