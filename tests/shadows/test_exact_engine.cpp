@@ -368,3 +368,43 @@ TEST_CASE("triangles at a receiver's height that end where what is asked of the 
     CHECK(wrong_bits(solve(scene, receivers_at(points), light, config, ShadowMethod::kExact), masks) == 0);
   }
 }
+
+TEST_CASE("alpha-tested triangles before lights of any kind give the oracle's bits, wherever their texture lies") {
+  std::uint64_t open = 0, blocked = 0;
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    CAPTURE(seed);
+    Random random(seed);
+    Scene scene = scene_of(random_triangles(100 + seed, 80));
+    AlphaMap map;
+    map.width = seed % 4 == 0 ? 1 + static_cast<std::uint32_t>(seed) / 8 : 3 + static_cast<std::uint32_t>(seed) * 5;
+    map.height = seed % 3 == 0 ? 1 : 64;
+    for (std::uint32_t i = 0; i < map.width * map.height; ++i)
+      map.alpha.push_back(static_cast<std::uint8_t>(random.uniform(0.0, 256.0)));
+    Material material;
+    material.alpha_map = 0, material.alpha_cutoff = 0.4f;
+    scene.alpha_maps = {map}, scene.materials = {material};
+    scene.triangle_materials.assign(scene.triangles.size(), 0);
+    const double far = std::exp2(random.uniform(-3.0, 12.0)), size = std::exp2(random.uniform(-4.0, 5.0));
+    for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
+      std::array<vec2, 3> uv;
+      for (vec2& p : uv) p = vec2(dvec2(random.in_box(-far, far)) * (t % 2 ? 1.0 : 0.0) + dvec2(random.in_box(-size, size)));
+      scene.triangle_uvs.push_back(uv);
+    }
+    std::vector<dvec3> points;
+    for (int i = 0; i < 300; ++i)
+      points.push_back({random.uniform(-4, 4), random.uniform(-4.5, 2.0), random.uniform(-4, 4)});
+    Light light = frame_light();
+    light.radius = 1.0, light.normal = {0.2, -1.0, 0.1};
+    constexpr LightShape kShapes[] = {LightShape::kRectangle, LightShape::kDisk, LightShape::kSphere};
+    light.shape = kShapes[seed % 3];
+    ShadowConfig config = frame_config(64);
+    config.pattern = seed % 2 ? SamplePattern::kRows : SamplePattern::kLowDiscrepancy;
+    config.sample_sets = seed % 5 == 0 ? 3 : 1;
+    const VisibilityMasks truth = solve(scene, receivers_at(points), light, config, ShadowMethod::kOracle);
+    CHECK(wrong_bits(solve(scene, receivers_at(points), light, config, ShadowMethod::kExact), truth) == 0);
+    for (const std::uint64_t word : truth.words) blocked += static_cast<std::uint64_t>(std::popcount(word));
+    open += 300 * 64;
+  }
+  CHECK(blocked > 10'000);
+  CHECK(blocked < open / 2);
+}
