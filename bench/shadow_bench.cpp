@@ -49,7 +49,7 @@ struct MethodResult {
   ShadowStats stats;
   OracleCheck check;
   Timing timing;
-  std::shared_ptr<KeptExact> kept;  // exact, flat lights: what a static scene keeps; null for other methods
+  std::shared_ptr<KeptExact> kept;  // exact: what a static scene keeps; null for other methods
 };
 
 struct RivalResult {
@@ -66,7 +66,6 @@ struct Row {
 };
 
 std::shared_ptr<KeptExact> build_exact(const Case& c) {
-  if (!c.samples.flat) return nullptr;
   auto kept = std::make_shared<KeptExact>();
   Stopwatch watch;
   kept->closed = find_closed_components(c.mesh);

@@ -128,11 +128,13 @@ class TriangleAnywhere {
   }
 
   HWY_INLINE void Test(const SamplePlace& p, LaneMask& possible, LaneMask& inside) const {
-    for (std::size_t k = 0; k < count_; ++k) {
-      const Vec place = hn::MulAdd(sign_[k], p.column, hn::Mul(slope_[k], p.row));
-      const LaneMask may = hn::Ge(place, possible_[k]), is = hn::Gt(place, inside_[k]);
-      possible = k == 0 ? may : hn::And(possible, may);
-      inside = k == 0 ? is : hn::And(inside, is);
+    const auto place = [&](std::size_t k) HWY_ATTR {
+      return hn::MulAdd(sign_[k], p.column, hn::Mul(slope_[k], p.row));
+    };
+    possible = hn::Ge(place(0), possible_[0]), inside = hn::Gt(place(0), inside_[0]);
+    for (std::size_t k = 1; k < count_; ++k) {
+      possible = hn::And(possible, hn::Ge(place(k), possible_[k]));
+      inside = hn::And(inside, hn::Gt(place(k), inside_[k]));
     }
   }
 

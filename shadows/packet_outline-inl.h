@@ -301,7 +301,7 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
     if (hn::AllFalse(d, may)) continue;
     alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
     alignas(HWY_MAX_BYTES) std::uint32_t turn[kMaxLanes], turn_twice[kMaxLanes];
-    alignas(HWY_MAX_BYTES) float box[2][2][kMaxLanes];
+    alignas(HWY_MAX_BYTES) float box[2][2][kMaxLanes] = {};
     std::uint64_t twice = 0;
     if (facing != nullptr) {
       const hn::Rebind<std::uint16_t, Tag> d16;
