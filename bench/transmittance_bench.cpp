@@ -87,9 +87,9 @@ void dim(const RTCFilterFunctionNArguments* args) {
       continue;
     }
     const float b = RTCHitN_u(args->hit, args->N, i), c = RTCHitN_v(args->hit, args->N, i);
-    carried *= transmittance_of_texels(
-        pane.filter->at(texel_at(pane.filter->alpha_map(), pane.alpha_texel, b, c),
-                        texel_at(pane.filter->transmittance_map(), pane.color_texel, b, c)));
+    carried *=
+        transmittance_of_texels(pane.filter->at(texel_at(pane.filter->alpha_map(), pane.alpha_texel, b, c),
+                                                texel_at(pane.filter->transmittance_map(), pane.color_texel, b, c)));
   }
 }
 

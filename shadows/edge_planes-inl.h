@@ -1,6 +1,5 @@
 // The planes of blocker and receiver against light samples, per instruction set: what the kernels that loop over
-// triangles for a blocker (visibility_kernel.cpp) and over blockers for a receiver (exact_kernel.cpp) have in common.
-// Included once per Highway target.
+// receivers for a blocker have in common, and vectors for all. Included once per Highway target.
 
 #if defined(HALFSHADE_EDGE_PLANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_EDGE_PLANES_INL_H_

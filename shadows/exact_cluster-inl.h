@@ -1,5 +1,5 @@
-// The shaft from a cluster of receivers to the light against the tree of blockers, per instruction set. Included once per
-// Highway target by packet_kernel.cpp.
+// The shaft from a cluster of receivers to the light against the tree of blockers, per instruction set. Included once
+// per Highway target by packet_kernel.cpp.
 
 #if defined(HALFSHADE_EXACT_CLUSTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_EXACT_CLUSTER_INL_H_
@@ -9,7 +9,7 @@
 #endif
 
 #include "shadows/edge_planes-inl.h"
-#include "shadows/exact_kernel.h"
+#include "shadows/packet_kernel.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace halfshade {

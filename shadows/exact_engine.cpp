@@ -101,7 +101,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   const std::size_t nodes = blockers.tree->nodes.size();
-  work.scratches.start(concurrency(), nodes);
+  work.scratches.start(concurrency(), nodes, kept);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
@@ -114,8 +114,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
     });
   }
   add_counters(work.scratches, stats);
-  stats.bytes = std::max<std::uint64_t>(
-      stats.bytes, blockers.tree->bytes() + side.fit.bytes() + kernel.x.size() * 21);
+  stats.bytes = std::max<std::uint64_t>(stats.bytes, blockers.tree->bytes() + side.fit.bytes() + kernel.x.size() * 21);
   stats.test_ms += watch.lap();
 }
 
@@ -141,7 +140,7 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 }  // namespace
 
-void ScratchPool::start(std::size_t threads, std::size_t nodes) {
+void ScratchPool::start(std::size_t threads, std::size_t nodes, const ExactLight& light) {
   while (scratches_.size() < threads) scratches_.push_back(std::make_unique<ExactScratch>());
   const std::size_t groups = nodes + KernelReceivers::kLanePadding;
   std::size_t edges = 0, facing = 0, turning = 0;
@@ -150,6 +149,8 @@ void ScratchPool::start(std::size_t threads, std::size_t nodes) {
     turning = std::max(turning, s->turning.capacity());
     edges = std::max(edges, s->net_edges.vertex[0].size());
   }
+  const bool is_cloud = !light.bound.flat;
+  const std::size_t cells = cells_anywhere(light.samples.count, light.samples.sets);
   free_.clear();
   for (const auto& s : scratches_) {
     s->stack.reserve(nodes), s->group.reserve(groups), s->keys.reserve(groups);
@@ -157,6 +158,8 @@ void ScratchPool::start(std::size_t threads, std::size_t nodes) {
     s->facing.reserve(facing), s->turning.reserve(turning);
     s->old_group.reserve(groups), s->old_bound.reserve(groups);
     for (int k = 0; k < 3; ++k) s->low[k].reserve(groups), s->high[k].reserve(groups);
+    if (is_cloud || light.samples.sets > 1) s->places.place.reserve(cells), s->places.bounds.reserve(cells);
+    if (is_cloud) s->rows.reserve_cells(light.samples.sets, cells), s->wanted.reserve(light.samples.sets);
     s->lines.placed = PictureLines::kNothing;
     s->counters = {};
     s->leaves_listed = s->leaves_tested = s->clusters_lit = 0;
@@ -200,8 +203,8 @@ void prepare_exact_samples(const LightSamples& samples, ExactLight& kept) {
   kept.front = {dvec3(kept.bound.center), samples.axis_u, samples.axis_v, samples.axis_n};
   kept.samples = make_kernel_samples(samples, kept.bound, SampleOrder::kAsGiven, std::move(kept.samples));
   const auto& [center, u, v, n] = kept.front;
-  const LightFrame frames[6] = {{center, u, v, n}, {center, u, v, -n}, {center, v, n, u},
-                                {center, v, n, -u}, {center, n, u, v}, {center, n, u, -v}};
+  const LightFrame frames[6] = {{center, u, v, n},  {center, u, v, -n}, {center, v, n, u},
+                                {center, v, n, -u}, {center, n, u, v},  {center, n, u, -v}};
   kept.count = samples.one_sided ? 1 : samples.flat ? 2 : 6;
   for (std::size_t k = 0; k < kept.count; ++k) {
     ExactSide& side = kept.sides[k];
@@ -228,8 +231,11 @@ void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, 
     for (std::size_t i = begin; i != end; ++i) work.side[i] = side_of(kept, receivers.position[i]);
   });
   stats.index_ms += watch.lap();
-  for (std::size_t k = 0; k < kept.count; ++k)
-    solve_side(blockers, receivers, config, kept, static_cast<std::uint8_t>(k), work, masks, stats);
+  for (std::size_t k = 0; k < kept.count; ++k) {
+    const auto side = static_cast<std::uint8_t>(k);
+    if (std::find(work.side.begin(), work.side.end(), side) != work.side.end())
+      solve_side(blockers, receivers, config, kept, side, work, masks, stats);
+  }
   solve_grazing(blockers.mesh, receivers, light, samples, work.side, config, masks, stats);
 }
 

@@ -10,8 +10,8 @@
 #include <mutex>
 
 #include "shadows/closed_components.h"
-#include "shadows/exact_kernel.h"
 #include "shadows/light_view.h"
+#include "shadows/packet_kernel.h"
 #include "shadows/space_curve.h"
 
 namespace halfshade {
@@ -51,9 +51,9 @@ struct ExactLight {
 /// One for each thread at work, kept from call to call.
 class ScratchPool {
  public:
-  /// Room for so many threads and for a tree of so many nodes; nothing is left of earlier calls but memory, the same for
-  /// all: which cluster meets which scratch changes from call to call.
-  void start(std::size_t threads, std::size_t nodes);
+  /// Room for so many threads, for a tree of so many nodes and for the samples of `light`; nothing is left of earlier
+  /// calls but memory, the same for all: which cluster meets which scratch changes from call to call.
+  void start(std::size_t threads, std::size_t nodes, const ExactLight& light);
   ExactScratch& take();
   void give(ExactScratch& scratch);
   const std::vector<std::unique_ptr<ExactScratch>>& all() const { return scratches_; }
@@ -83,8 +83,8 @@ void prepare_exact_light(const Light& light, const LightSamples& samples, ExactL
 void prepare_exact_samples(const LightSamples& samples, ExactLight& kept);
 
 /// Masks of all receivers, exact, by a light that was prepared. Allocates nothing where `work` has room for the
-/// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane or near to
-/// a light that has none.
+/// receivers and the lists of leaves are not longer than they ever were, unless receivers lie in the light's plane or
+/// near to a light that has none.
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,
                  const LightSamples& samples, const ShadowConfig& config, ExactLight& kept, ExactWork& work,
                  VisibilityMasks& masks, ShadowStats& stats);

@@ -1,5 +1,6 @@
-// Samples anywhere in the pictures of a packet, per instruction set: where rows are found by one multiplication, these are
-// asked one by one, each for all receivers of the packet at once. Included once per Highway target by packet_kernel.cpp.
+// Samples anywhere in the pictures of a packet, per instruction set: where rows are found by one multiplication, these
+// are asked one by one, each for all receivers of the packet at once. Included once per Highway target by
+// packet_kernel.cpp.
 
 #if defined(HALFSHADE_PACKET_ANYWHERE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef HALFSHADE_PACKET_ANYWHERE_INL_H_
@@ -30,7 +31,8 @@ struct SamplePlace {
   }
 };
 
-/// The samples of a packet's receivers. Where they differ between receivers: in their sets, or because they are a cloud (`is_cloud`). A sample l of that is seen from r at l + (l - r) k with k = l_z / (r_z - l_z).
+/// The samples of a packet's receivers. Where they differ between receivers: in their sets, or because they are a cloud
+/// (`is_cloud`). A sample l of that is seen from r at l + (l - r) k with k = l_z / (r_z - l_z).
 HWY_INLINE void PlaceSamples(const SampleRows& rows, bool is_cloud, const Packet& packet, PlacedSamples& places) {
   const Tag d;
   const std::uint8_t* const set = packet.set;
@@ -128,9 +130,8 @@ class TriangleAnywhere {
   }
 
   HWY_INLINE void Test(const SamplePlace& p, LaneMask& possible, LaneMask& inside) const {
-    const auto place = [&](std::size_t k) HWY_ATTR {
-      return hn::MulAdd(sign_[k], p.column, hn::Mul(slope_[k], p.row));
-    };
+    const auto place = [&](std::size_t k)
+                           HWY_ATTR { return hn::MulAdd(sign_[k], p.column, hn::Mul(slope_[k], p.row)); };
     possible = hn::Ge(place(0), possible_[0]), inside = hn::Gt(place(0), inside_[0]);
     for (std::size_t k = 1; k < count_; ++k) {
       possible = hn::And(possible, hn::Ge(place(k), possible_[k]));
@@ -148,8 +149,8 @@ constexpr float kRowRounding = 2e-5f;
 
 /// The edges as the receivers see them.
 ///
-/// Where the ends of edges are rounded, the same for all edges that they belong to, a sample that no edge comes nearer to
-/// than that is wound around as often as before. So only samples near to an edge are doubtful.
+/// Where the ends of edges are rounded, the same for all edges that they belong to, a sample that no edge comes nearer
+/// to than that is wound around as often as before. So only samples near to an edge are doubtful.
 HWY_INLINE void GroupOutline::SetAnywhere() {
   const Tag d;
   const IntTag di;
@@ -185,9 +186,9 @@ HWY_INLINE void GroupOutline::SetAnywhere() {
 HWY_INLINE LaneMask GroupOutline::EndsNear(std::size_t e, Vec row) const {
   const Tag d;
   const Vec ya = hn::Load(d, edges_.end_row[0][e]), yb = hn::Load(d, edges_.end_row[1][e]);
-  const Vec error = hn::Add(hn::Max(hn::Load(d, vertices_.error[edges_.from[e]]),
-                                    hn::Load(d, vertices_.error[edges_.to[e]])),
-                            hn::Set(d, rows_.deviation));
+  const Vec error =
+      hn::Add(hn::Max(hn::Load(d, vertices_.error[edges_.from[e]]), hn::Load(d, vertices_.error[edges_.to[e]])),
+              hn::Set(d, rows_.deviation));
   const Vec off = hn::MulAdd(error, hn::Set(d, rows_.row_scale), hn::Set(d, kRowRounding));
   return hn::And(hn::Ge(row, hn::Sub(hn::Min(ya, yb), off)), hn::Le(row, hn::Add(hn::Max(ya, yb), off)));
 }
@@ -206,9 +207,8 @@ HWY_INLINE LaneMask GroupOutline::WindSample(std::size_t at, LaneMask& doubtful)
             low_row = hn::Set(d, bounds.low_row), high_row = hn::Set(d, bounds.high_row);
   auto around = hn::Zero(di);
   doubtful = hn::Lt(low_row, low_row);
-  const auto ends_behind = [&](std::size_t e, int end) HWY_ATTR {
-    return hn::Le(hn::Load(d, edges_.end_row[end][e]), sample.row);
-  };
+  const auto ends_behind = [&](std::size_t e, int end)
+                               HWY_ATTR { return hn::Le(hn::Load(d, edges_.end_row[end][e]), sample.row); };
   using Signs = decltype(around);
   const auto cross = [&](LaneMask to, LaneMask from, Signs sign) HWY_ATTR {
     around = hn::IfThenElse(hn::RebindMask(di, to), hn::Add(around, sign), around);
@@ -225,8 +225,7 @@ HWY_INLINE LaneMask GroupOutline::WindSample(std::size_t at, LaneMask& doubtful)
       const std::size_t e = first + static_cast<std::size_t>(std::countr_zero(bits));
       const Vec x = hn::MulAdd(hn::Load(d, edges_.slope[e]), sample.row, hn::Load(d, edges_.column[e]));
       const Vec beyond = hn::Sub(sample.column, x);
-      const LaneMask right = hn::Gt(beyond, hn::Zero(d)),
-                     near = hn::Le(hn::Abs(beyond), hn::Load(d, edges_.width[e]));
+      const LaneMask right = hn::Gt(beyond, hn::Zero(d)), near = hn::Le(hn::Abs(beyond), hn::Load(d, edges_.width[e]));
       const auto sign = sign_of(e);
       if (!hn::AllFalse(d, near)) {
         const LaneMask is_edge = hn::RebindMask(d, hn::Ne(sign, hn::Zero(di)));

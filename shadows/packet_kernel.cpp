@@ -5,7 +5,7 @@
 // What is decided once for the whole packet: which leaves, which of a leaf's triangles (16 at a time), which rows.
 #include <optional>
 
-#include "shadows/exact_kernel.h"
+#include "shadows/packet_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shadows/packet_kernel.cpp"
@@ -66,9 +66,9 @@ class PacketSolver {
   bool RasterizeTriangle(std::size_t leaf, const LeafView& view, std::size_t lane);
   void StoreMasks();
 
-  HWY_INLINE UintVec WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const;
-  HWY_INLINE UintVec TestSamples(const TriangleAnywhere& triangle, const PictureRange& range, std::uint32_t line,
-                                 UintVec& inside) const;
+  HWY_NOINLINE UintVec WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const;
+  HWY_NOINLINE UintVec TestSamples(const TriangleAnywhere& triangle, const PictureRange& range, std::uint32_t line,
+                                   UintVec& inside) const;
   HWY_INLINE void SetPlanes(PacketTriangle& triangle) const;
   HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range,
                                 const LineSet& lines);
@@ -90,7 +90,8 @@ class PacketSolver {
     vec3 operator[](std::size_t bit) const { return {x[bit], y[bit], z[bit]}; }
   };
   LinePoints PointsOf(std::size_t lane, std::uint32_t line) const {
-    return {rows_.line_points(rows_.point_x, packet_.set[lane], line), rows_.line_points(rows_.point_y, packet_.set[lane], line),
+    return {rows_.line_points(rows_.point_x, packet_.set[lane], line),
+            rows_.line_points(rows_.point_y, packet_.set[lane], line),
             rows_.line_points(rows_.point_z, packet_.set[lane], line)};
   }
 
@@ -102,13 +103,13 @@ class PacketSolver {
   KernelCounters& counters_;
   Packet packet_;
   LineSet changed_lines_;
-  PictureRanges leaf_ranges_;                     // of the group at work
-  LeafView views_[BlockerTree::kWidth];           // of its leaves
-  std::uint32_t viewed_ = 0;                      // those that are there
-  GroupOutline outline_;                          // of the patch at work
-  ProjectedVertices vertices_;                    // of the leaf at work
-  const AlphaTriangle* texels_of_ = nullptr;       // the perforated triangle that these belong to:
-  PacketTexels texels_;                            // where `has_texels_`
+  PictureRanges leaf_ranges_;                 // of the group at work
+  LeafView views_[BlockerTree::kWidth];       // of its leaves
+  std::uint32_t viewed_ = 0;                  // those that are there
+  GroupOutline outline_;                      // of the patch at work
+  ProjectedVertices vertices_;                // of the leaf at work
+  const AlphaTriangle* texels_of_ = nullptr;  // the perforated triangle that these belong to:
+  PacketTexels texels_;                       // where `has_texels_`
   bool has_texels_ = false;
   std::optional<TexelLookup> lookups_[kMaxLanes];  // made when first needed
 };
@@ -309,15 +310,15 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
 }
 
 /// `asked` samples of a line as WindLine gives them.
-HWY_INLINE UintVec PacketSolver::WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const {
+UintVec PacketSolver::WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const {
   const UintTag du;
   UintVec blocked = hn::Zero(du);
   doubtful = blocked;
   for (; asked != 0; asked &= asked - 1) {
     const UintVec bit = hn::Set(du, asked & (0u - asked));
     LaneMask unsure;
-    const LaneMask hidden = outline_.WindSample(
-        line * SampleRows::kWord + static_cast<std::size_t>(std::countr_zero(asked)), unsure);
+    const LaneMask hidden =
+        outline_.WindSample(line * SampleRows::kWord + static_cast<std::size_t>(std::countr_zero(asked)), unsure);
     blocked = hn::Or(blocked, hn::IfThenElseZero(hn::RebindMask(du, hidden), bit));
     doubtful = hn::Or(doubtful, hn::IfThenElseZero(hn::RebindMask(du, unsure), bit));
   }
@@ -406,10 +407,10 @@ HWY_INLINE std::array<LaneMask, 4> PacketSolver::Orient(const PacketTriangle& tr
   return up;
 }
 
-/// Of a line's samples that are in the range and open to somebody, those that may be inside the triangle, and those that
-/// certainly are.
-HWY_INLINE UintVec PacketSolver::TestSamples(const TriangleAnywhere& triangle, const PictureRange& range,
-                                             std::uint32_t line, UintVec& inside) const {
+/// Of a line's samples that are in the range and open to somebody, those that may be inside the triangle, and those
+/// that certainly are.
+UintVec PacketSolver::TestSamples(const TriangleAnywhere& triangle, const PictureRange& range, std::uint32_t line,
+                                  UintVec& inside) const {
   const UintTag du;
   UintVec possible = hn::Zero(du);
   inside = possible;
@@ -443,16 +444,17 @@ HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, Lane
     for (const LaneMask turned : {none, hn::Not(none)}) {
       const std::array<LaneMask, 4> up = Orient(triangle, turned);
       const Outline outline(triangle, up, Bits(unknown));
-      const TriangleAnywhere anywhere(rows_, triangle, up);
+      std::optional<TriangleAnywhere> anywhere;
+      if (rows_.anywhere) anywhere.emplace(rows_, triangle, up);
       lines.for_each([&](std::uint32_t line) HWY_ATTR {
         const UintTag du;
         const PictureLines& l = *packet_.lines;
         UintVec inside;
-        const UintVec possible = hn::And(rows_.anywhere ? TestSamples(anywhere, range, line, inside)
-                                                        : outline.possible(hn::Load(d, l.y[line]),
-                                                                           hn::Load(d, l.offset[line]),
-                                                                           hn::Load(d, l.rest[line])),
-                                         hn::Load(du, packet_.open[line]));
+        const UintVec possible = hn::And(
+            rows_.anywhere
+                ? TestSamples(*anywhere, range, line, inside)
+                : outline.possible(hn::Load(d, l.y[line]), hn::Load(d, l.offset[line]), hn::Load(d, l.rest[line])),
+            hn::Load(du, packet_.open[line]));
         matters = hn::Or(matters, hn::RebindMask(d, hn::Ne(possible, hn::Zero(du))));
       });
     }
@@ -524,7 +526,8 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
   const UintTag du;
   const std::array<LaneMask, 4> up = Orient(triangle, below);
   const Outline outline(triangle, up, Bits(active));
-  const TriangleAnywhere anywhere(rows_, triangle, up);
+  std::optional<TriangleAnywhere> anywhere;
+  if (rows_.anywhere) anywhere.emplace(rows_, triangle, up);
   const auto wanted = hn::VecFromMask(du, hn::RebindMask(du, active));
   bool added = false;
   lines.for_each([&](std::uint32_t line) HWY_ATTR {
@@ -532,8 +535,8 @@ HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const Pi
     const Vec y = hn::Load(d, l.y[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
     const UintVec open = hn::Load(du, packet_.open[line]), asked = hn::And(open, wanted);
     UintVec inside;
-    const UintVec possible = hn::And(asked, rows_.anywhere ? TestSamples(anywhere, range, line, inside)
-                                                           : outline.possible(y, offset, rest));
+    const UintVec possible = hn::And(
+        asked, rows_.anywhere ? TestSamples(*anywhere, range, line, inside) : outline.possible(y, offset, rest));
     ++counters_.sample_tests;
     if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return;
     inside = hn::And(asked, rows_.anywhere ? inside : outline.inside(y, offset, rest));
@@ -598,7 +601,8 @@ void PacketSolver::StoreMasks() {
       std::uint64_t blocked = rows_.valid_of(packet_.set[lane], line) & ~packet_.open[line][lane];
       if (blocked == 0) continue;
       if (rows_.anywhere) {
-        const std::uint16_t* const sample = rows_.sample_of.data() + packet_.set[lane] * rows_.stride + line * SampleRows::kWord;
+        const std::uint16_t* const sample =
+            rows_.sample_of.data() + packet_.set[lane] * rows_.stride + line * SampleRows::kWord;
         for (; blocked != 0; blocked &= blocked - 1) {
           const std::uint16_t s = sample[std::countr_zero(blocked)];
           mask[s / 64] |= std::uint64_t{1} << s % 64;

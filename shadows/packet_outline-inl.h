@@ -201,9 +201,7 @@ class GroupOutline {
     up = hn::Or(hn::And(up, positive), hn::And(down, negative)), down = turned_down;
   }
   /// How far a row may lie off its place, in rows.
-  float RowSpread() const {
-    return rows_.row_spread + rows_.deviation * rows_.row_scale + 1e-5f;
-  }
+  float RowSpread() const { return rows_.row_spread + rows_.deviation * rows_.row_scale + 1e-5f; }
 
   const ExactScene& scene_;
   const SampleRows& rows_;
@@ -217,9 +215,10 @@ class GroupOutline {
   // How far the receivers reach to either side of it. Not the larger of both for either side: vertices of the patch lie
   // below all receivers of the cluster, but not below more.
   float before_[3] = {}, beyond_[3] = {};
-  Vec3 from_middle_;         // to the receivers, in columns, rows and along the light's normal
-  std::uint32_t slots_ = 0;  // of vertices_ that are taken
-  std::uint32_t calls_ = 0;  // of Collect
+  Vec3 from_middle_;  // to the receivers, in columns, rows and along the light's normal
+  alignas(HWY_MAX_BYTES) float box_[2][2][kMaxLanes];              // of CollectEdges: [axis][end]
+  std::uint32_t slots_ = 0;                                        // of vertices_ that are taken
+  std::uint32_t calls_ = 0;                                        // of Collect
   std::uint32_t projected_in_[3 * BlockerTree::kGroupSlots] = {};  // [vertex of a group] call that projected it,
   std::uint8_t slot_of_[3 * BlockerTree::kGroupSlots];             // and where to
 };
@@ -301,7 +300,6 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
     if (hn::AllFalse(d, may)) continue;
     alignas(HWY_MAX_BYTES) std::int32_t first[kMaxLanes], last[kMaxLanes];
     alignas(HWY_MAX_BYTES) std::uint32_t turn[kMaxLanes], turn_twice[kMaxLanes];
-    alignas(HWY_MAX_BYTES) float box[2][2][kMaxLanes] = {};
     std::uint64_t twice = 0;
     if (facing != nullptr) {
       const hn::Rebind<std::uint16_t, Tag> d16;
@@ -326,14 +324,14 @@ bool GroupOutline::CollectEdges(std::uint32_t first_edge, std::uint32_t end, con
       const Vec around = hn::Add(pad, hn::Set(d, rows_.deviation));
       for (int axis = 0; axis < 2; ++axis) {
         const Vec scale = axis == 0 ? hn::Set(d, rows_.scale) : row_scale;
-        hn::Store(hn::MulAdd(hn::Sub(low[axis], around), scale, hn::Set(d, -kSlack)), d, box[axis][0]);
-        hn::Store(hn::MulAdd(hn::Add(high[axis], around), scale, hn::Set(d, kSlack)), d, box[axis][1]);
+        hn::Store(hn::MulAdd(hn::Sub(low[axis], around), scale, hn::Set(d, -kSlack)), d, box_[axis][0]);
+        hn::Store(hn::MulAdd(hn::Add(high[axis], around), scale, hn::Set(d, kSlack)), d, box_[axis][1]);
       }
     }
     const auto set_box = [&](std::uint32_t i, std::size_t lane) {
       if (!rows_.anywhere) return;
-      edges_.columns.low[i] = box[0][0][lane], edges_.columns.high[i] = box[0][1][lane];
-      edges_.rows.low[i] = box[1][0][lane], edges_.rows.high[i] = box[1][1][lane];
+      edges_.columns.low[i] = box_[0][0][lane], edges_.columns.high[i] = box_[0][1][lane];
+      edges_.rows.low[i] = box_[1][0][lane], edges_.rows.high[i] = box_[1][1][lane];
     };
     for (; bits != 0; bits &= bits - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(bits));

@@ -1,5 +1,5 @@
-// Texels of an alpha-tested triangle for a packet of receivers at a time, per instruction set. Included once per Highway
-// target by packet_kernel.cpp.
+// Texels of an alpha-tested triangle for a packet of receivers at a time, per instruction set. Included once per
+// Highway target by packet_kernel.cpp.
 //
 // A texture coordinate under a sample is a ratio of two linear functions of the sample's place (alpha.h). Near a place
 // of reference it is m + (U - m S) / S with a whole number m: the difference, found in double, is small, so that float
@@ -30,7 +30,8 @@ class PacketTexels {
   HWY_INLINE UintVec Opaque(std::uint32_t line, UintVec asked, UintVec& open);
 
  private:
-  /// Columns and rows from the light's centre; of a cloud, whose samples are not projected here, lengths above its plane.
+  /// Columns and rows from the light's centre; of a cloud, whose samples are not projected here, lengths above its
+  /// plane.
   using Place = std::array<Vec, 3>;
   /// A function of the place, a double for each receiver.
   struct Linear {
@@ -62,8 +63,8 @@ class PacketTexels {
   const ExactScene* scene_ = nullptr;
   const Packet* packet_ = nullptr;
   const AlphaTriangle* triangle_ = nullptr;
-  Linear coordinate_[2], sum_;  // numerators of u and v, in texels; denominator
-  double most_[2];              // |coordinate| of the corners, in texels
+  Linear coordinate_[2], sum_;                        // numerators of u and v, in texels; denominator
+  double most_[2];                                    // |coordinate| of the corners, in texels
   alignas(HWY_MAX_BYTES) float rounding_[kMaxLanes];  // of the denominator; of a numerator for each texel of `most_`
   float off_place_ = 0.0f;                            // samples lie so far off their places, along any axis
   // Since Refer:
@@ -72,7 +73,7 @@ class PacketTexels {
   Step step_[2], sum_step_;
   IntVec first_[2];           // the whole numbers, wrapped into the texture
   LaneMask is_good_, wraps_;  // receivers for which float is enough, for which texels may lie beyond the border
-  Vec most_off_;  // from the middle of a texel, along either axis: farther away the texel is open
+  Vec most_off_;              // from the middle of a texel, along either axis: farther away the texel is open
 };
 
 bool PacketTexels::Set(const ExactScene& scene, const Packet& packet, const AlphaTriangle& triangle,
@@ -132,10 +133,10 @@ void PacketTexels::FindPlanes() {
   struct Wide3 {
     Wide x, y, z;
   };
-  const auto dot = [&](const Wide3& a, const Wide3& b) HWY_ATTR {
-    return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-  };
-  const auto norm1 = [&](const Wide3& a) HWY_ATTR { return hn::Add(hn::Abs(a.x), hn::Add(hn::Abs(a.y), hn::Abs(a.z))); };
+  const auto dot = [&](const Wide3& a, const Wide3& b)
+                       HWY_ATTR { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); };
+  const auto norm1 = [&](const Wide3& a)
+                         HWY_ATTR { return hn::Add(hn::Abs(a.x), hn::Add(hn::Abs(a.y), hn::Abs(a.z))); };
   const auto splat = [&](const dvec3& a) HWY_ATTR { return Wide3{hn::Set(d, a.x), hn::Set(d, a.y), hn::Set(d, a.z)}; };
   const Wide3 by_column = splat(dvec3(rows.axis_x) / double{rows.scale}),
               by_row = splat(dvec3(rows.axis_y) / double{rows.row_scale}), by_height = splat(scene_->frame.n);
@@ -156,7 +157,8 @@ void PacketTexels::FindPlanes() {
   hn::Store(packet_->position.x, df, position[0]), hn::Store(packet_->position.y, df, position[1]);
   hn::Store(packet_->position.z, df, position[2]);
   for (std::size_t lane = 0; lane < hn::Lanes(df); lane += hn::Lanes(d)) {
-    const auto coordinate = [&](int axis) HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(narrow, position[axis] + lane)); };
+    const auto coordinate = [&](int axis)
+                                HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(narrow, position[axis] + lane)); };
     const Wide3 r{coordinate(0), coordinate(1), coordinate(2)};
     const auto from_receiver = [&](const vec3& p) HWY_ATTR {
       return Wide3{hn::Sub(hn::Set(d, double{p.x}), r.x), hn::Sub(hn::Set(d, double{p.y}), r.y),
@@ -214,9 +216,8 @@ void PacketTexels::Refer(const Place& reference, const Place& away) {
       return v;
     };
     const Wide s = value(sum_), sign = hn::CopySignToAbs(hn::Set(d, 1.0), s), inverse = hn::Div(hn::Set(d, 1.0), s);
-    const auto store = [&](Wide v, float* to) HWY_ATTR {
-      hn::StoreU(hn::DemoteTo(narrow, hn::Mul(v, sign)), narrow, to + lane);
-    };
+    const auto store = [&](Wide v, float* to)
+                           HWY_ATTR { hn::StoreU(hn::DemoteTo(narrow, hn::Mul(v, sign)), narrow, to + lane); };
     store(s, denominator[0]);
     for (int k = 0; k < 3; ++k) store(hn::Load(d, sum_.by[k] + lane), denominator[k + 1]);
     for (int axis = 0; axis < 2; ++axis) {
@@ -256,14 +257,14 @@ void PacketTexels::Refer(const Place& reference, const Place& away) {
     step_[k] = step_of(numerator[k]);
     const Vec first = hn::Load(df, whole[k]), reach = step_[k].Reach(away), ratio = hn::Mul(reach, inverse_least);
     first_[k] = hn::ConvertTo(di, first);
-    const Vec off = hn::MulAdd(units, reach, hn::MulAdd(hn::Set(df, static_cast<float>(2.0001 * most_[k])), rounding,
-                                                        moved(step_[k])));
+    const Vec off = hn::MulAdd(
+        units, reach, hn::MulAdd(hn::Set(df, static_cast<float>(2.0001 * most_[k])), rounding, moved(step_[k])));
     const Vec relative = hn::MulAdd(off_sum, inverse_least, hn::Add(units, units));
     margin = hn::Max(margin, hn::Mul(hn::MulAdd(off, inverse_least, hn::Mul(ratio, relative)), hn::Set(df, 1.001f)));
     const float size = static_cast<float>(k == 0 ? triangle_->width : triangle_->height);
     const Vec far = hn::Add(ratio, hn::Set(df, 2.0f));
-    wraps_ = hn::Or(wraps_, hn::Or(hn::Lt(hn::Sub(first, far), hn::Zero(df)),
-                                   hn::Ge(hn::Add(first, far), hn::Set(df, size))));
+    wraps_ = hn::Or(wraps_,
+                    hn::Or(hn::Lt(hn::Sub(first, far), hn::Zero(df)), hn::Ge(hn::Add(first, far), hn::Set(df, size))));
     // Texels that are wrapped lie at most one texture away.
     is_good_ = k == 0 ? hn::Lt(far, hn::Set(df, size)) : hn::And(is_good_, hn::Lt(far, hn::Set(df, size)));
   }
@@ -328,11 +329,10 @@ HWY_INLINE UintVec PacketTexels::Lookup(std::uint32_t line, std::uint32_t any, U
     const auto at = hn::Add(hn::Mul(row, width), column);
     // The byte is the last of a word of four, or is in the first word.
     const auto word_at = hn::Max(hn::Sub(at, hn::Set(di, 3)), hn::Zero(di));
-    const UintVec four = hn::BitCast(
-        du, hn::GatherOffset(di, alpha, hn::IfThenElseZero(hn::RebindMask(di, certain), word_at)));
+    const UintVec four =
+        hn::BitCast(du, hn::GatherOffset(di, alpha, hn::IfThenElseZero(hn::RebindMask(di, certain), word_at)));
     const UintVec shift = hn::ShiftLeft<3>(hn::BitCast(du, hn::Sub(at, word_at)));
-    const auto byte =
-        hn::BitCast(di, hn::And(hn::Shr(four, hn::And(shift, hn::Set(du, 31u))), hn::Set(du, 0xffu)));
+    const auto byte = hn::BitCast(di, hn::And(hn::Shr(four, hn::And(shift, hn::Set(du, 31u))), hn::Set(du, 0xffu)));
     const UintVec sure = hn::IfThenElseZero(hn::RebindMask(du, certain), bit);
     known = hn::Or(known, sure);
     opaque = hn::Or(opaque, hn::IfThenElseZero(hn::RebindMask(du, hn::Gt(byte, most_clear)), sure));
@@ -354,8 +354,8 @@ HWY_INLINE UintVec PacketTexels::Opaque(std::uint32_t line, UintVec asked, UintV
     ReferToLine(line, any);
   }
   UintVec known;
-  const UintVec opaque = hn::AllFalse(d, hn::And(wraps_, asking)) ? Lookup<false>(line, any, known)
-                                                                  : Lookup<true>(line, any, known);
+  const UintVec opaque =
+      hn::AllFalse(d, hn::And(wraps_, asking)) ? Lookup<false>(line, any, known) : Lookup<true>(line, any, known);
   open = hn::AndNot(known, asked);
   return hn::And(opaque, asked);
 }

@@ -22,7 +22,7 @@ struct SampleRows {
   std::uint32_t rows = 0, columns = 0, lines = 0;
   vec3 axis_x{1, 0, 0}, axis_y{0, 1, 0};
   vec3 low{1e30f}, high{-1e30f};  // around the samples of all sets in the light's frame, rounded outwards
-  float scale = 1.0f;                             // columns per unit of length
+  float scale = 1.0f;             // columns per unit of length
   float least_offset = 0.0f, most_offset = 0.0f;  // over all rows (not lines)
   /// Row j lies between (j - most_row_offset) / row_scale and (j - least_row_offset) / row_scale, in all sets.
   float row_scale = 1.0f, least_row_offset = 0.0f, most_row_offset = 0.0f;
@@ -62,6 +62,8 @@ struct SampleRows {
     return (valid_of(set, line_of(row, column)) >> column % kWord & 1) != 0;
   }
   void make_room_for_points(std::size_t count);
+  /// Memory for arrange_cloud: so many sets of so many cells.
+  void reserve_cells(std::size_t sets, std::size_t cells);
   void set_point(std::size_t at, const vec3& p) {
     point_x[kRoom + at] = p.x, point_y[kRoom + at] = p.y, point_z[kRoom + at] = p.z;
   }
@@ -75,6 +77,9 @@ struct SampleRows {
 
 /// No rows, and the memory of those that there were.
 SampleRows no_rows(SampleRows& rows, const LightFrame& frame);
+
+/// SampleRows::stride of so many samples anywhere.
+std::size_t cells_anywhere(std::uint32_t count, std::uint32_t sets);
 
 /// Samples of a plane that form no rows into `rows`, which are empty.
 void sort_samples_anywhere(const KernelSamples& samples, const LightFrame& frame, SampleRows& rows);
@@ -95,8 +100,8 @@ SampleRows find_sample_rows(const LightSamples& light, const KernelSamples& samp
 SampleCloud make_sample_cloud(const KernelSamples& samples, const LightFrame& frame, SampleCloud reuse = {});
 
 /// A cloud as samples anywhere, sorted by where they are seen before the plane z = 0 from `from`, which lies above all
-/// of them: their numbers, unprojected places and points for the sets that `wanted` names. Where each receiver sees them,
-/// and so offsets, `deviation` and `reach_y`, is up to the packets (packet_anywhere-inl.h).
+/// of them: their numbers, unprojected places and points for the sets that `wanted` names. Where each receiver sees
+/// them, and so offsets, `deviation` and `reach_y`, is up to the packets (packet_anywhere-inl.h).
 void arrange_cloud(const SampleCloud& cloud, const KernelSamples& samples, const LightFrame& frame, const vec3& from,
                    std::span<const std::uint8_t> wanted, SampleRows& rows);
 

@@ -10,8 +10,8 @@
 namespace halfshade {
 namespace {
 
-/// More cells than samples, so that few lie far off their place; not for several sets, which would take different cells.
-/// A word in each row where that is possible.
+/// More cells than samples, so that few lie far off their place; not for several sets, which would take different
+/// cells. A word in each row where that is possible.
 void divide_into_cells(std::uint32_t count, std::uint32_t sets, SampleRows& rows) {
   constexpr std::uint32_t kWord = SampleRows::kWord;
   const double cells = (sets == 1 ? 1.6 : 1.0) * count;
@@ -20,13 +20,14 @@ void divide_into_cells(std::uint32_t count, std::uint32_t sets, SampleRows& rows
   rows.rows = std::min(static_cast<std::uint32_t>(std::ceil(cells / rows.columns)), SampleRows::kMaxRows);
   rows.lines = rows.rows * ((rows.columns + kWord - 1) / kWord);
   rows.stride = rows.lines * kWord;
-  for (std::uint32_t line = 0; line < rows.lines; ++line) rows.first.push_back(static_cast<std::int32_t>(line * kWord));
 }
 
 /// Room for so many sets, without samples: cells lie where they belong.
 void clear_cells(std::uint32_t sets, SampleRows& rows) {
   const std::size_t size = std::size_t{sets} * rows.stride;
   rows.valid.resize(std::size_t{sets} * rows.lines);
+  for (std::uint32_t line = 0; line < rows.lines; ++line)
+    rows.first.push_back(static_cast<std::int32_t>(line * SampleRows::kWord));
   rows.sample_of.resize(size), rows.column_of.resize(size), rows.row_of.resize(size);
   rows.make_room_for_points(size);
 }
@@ -44,7 +45,8 @@ void scale_cells(const dvec2& low, const dvec2& high, SampleRows& rows) {
 /// Where the samples of a set lie, as far as finding cells for them goes.
 using SetPlaces = std::array<vec2, SampleRows::kMaxLines * SampleRows::kWord>;
 
-/// The samples of a set into its cells, by their places: rows by y, no more to a row than it has cells, and columns by x.
+/// The samples of a set into its cells, by their places: rows by y, no more to a row than it has cells, and columns by
+/// x.
 void sort_set(std::uint32_t count, std::uint32_t set, const SetPlaces& place, const dvec2& low, SampleRows& rows) {
   std::array<std::uint16_t, SampleRows::kMaxLines * SampleRows::kWord> order;
   std::iota(order.begin(), order.begin() + count, std::uint16_t{0});
@@ -79,7 +81,8 @@ void sort_set(std::uint32_t count, std::uint32_t set, const SetPlaces& place, co
 
 /// Puts each sample, and the middle of each cell without one, at its place.
 template <class At>
-void place_set(std::uint32_t set, const dvec2& low, std::span<const vec3> points, const At& place_at, SampleRows& rows) {
+void place_set(std::uint32_t set, const dvec2& low, std::span<const vec3> points, const At& place_at,
+               SampleRows& rows) {
   for (std::uint32_t row = 0; row < rows.rows; ++row) {
     for (std::uint32_t column = 0; column < rows.columns; ++column) {
       const std::size_t at = set * rows.stride + rows.slot(row, column);
@@ -95,6 +98,19 @@ void place_set(std::uint32_t set, const dvec2& low, std::span<const vec3> points
 }
 
 }  // namespace
+
+std::size_t cells_anywhere(std::uint32_t count, std::uint32_t sets) {
+  SampleRows rows;
+  divide_into_cells(count, sets, rows);
+  return rows.stride;
+}
+
+void SampleRows::reserve_cells(std::size_t sets, std::size_t cells) {
+  for (auto* values : {&point_x, &point_y, &point_z}) values->reserve(kRoom + sets * cells + 48);
+  for (auto* values : {&column_of, &row_of, &height_of}) values->reserve(sets * cells);
+  sample_of.reserve(sets * cells);
+  valid.reserve(sets * cells / kWord), first.reserve(cells / kWord);
+}
 
 void sort_samples_anywhere(const KernelSamples& samples, const LightFrame& frame, SampleRows& rows) {
   rows.anywhere = true;
@@ -120,10 +136,9 @@ void sort_samples_anywhere(const KernelSamples& samples, const LightFrame& frame
           rows.most_offset = std::max(rows.most_offset, static_cast<float>(column - p.x));
           rows.least_row_offset = std::min(rows.least_row_offset, static_cast<float>(row - p.y));
           rows.most_row_offset = std::max(rows.most_row_offset, static_cast<float>(row - p.y));
-          const dvec3 error = glm::abs(dvec3(samples.center) +
-                                       double{rows.column_of[at]} / double{rows.scale} * dvec3(rows.axis_x) +
-                                       double{rows.row_of[at]} / double{rows.row_scale} * dvec3(rows.axis_y) -
-                                       dvec3(points[sample]));
+          const dvec3 error =
+              glm::abs(dvec3(samples.center) + double{rows.column_of[at]} / double{rows.scale} * dvec3(rows.axis_x) +
+                       double{rows.row_of[at]} / double{rows.row_scale} * dvec3(rows.axis_y) - dvec3(points[sample]));
           rows.deviation = std::max(rows.deviation, static_cast<float>(std::max({error.x, error.y, error.z}) * 1.001));
         },
         rows);

@@ -61,17 +61,18 @@ struct SolveStats : ShadowStats {
 
 /// What a workspace keeps between calls.
 struct WorkspaceConfig {
-  /// Lights whose samples, and about 10 bytes per triangle (100 more if alpha-tested), are kept from call to
-  /// call, 1..256. Light number i of a call uses place i modulo this: what was there before is replaced. So of more
-  /// lights than places, those that share theirs with no other light of the call are kept.
+  /// Lights whose samples, and about 10 bytes per triangle (100 more if alpha-tested) for each of their sides that
+  /// receivers are on (of two, or six of a light without a plane), are kept from call to call, 1..256. Light number i
+  /// of a call uses place i modulo this: what was there before is replaced. So of more lights than places, those that
+  /// share theirs with no other light of the call are kept.
   std::uint32_t kept_lights = 1;
 };
 
 /// Scratch memory of one call at a time, and what can be kept between calls. Method `exact` allocates nothing in a call
-/// that follows others with as many receivers, a scene whose meshes are the same, and flat lights of the same shapes
+/// that follows others with as many receivers, a scene whose meshes are the same, and lights of the same shapes
 /// that all have a place here. Meshes and lights may have moved. Lists grow to the longest that was needed, so that the
 /// first frames of a movement may still allocate.
-/// Lights that are not flat, receivers in the plane of a light, and other methods allocate as they need.
+/// Receivers in the plane of a light, or near to a light that has none, and other methods allocate as they need.
 /// Distinct Workspaces may be used concurrently; one Workspace may not: a call that finds it in use throws
 /// Error{kUsage}.
 class HALFSHADE_API Workspace {

@@ -1,5 +1,5 @@
-// Connected surfaces, fine and bumpy, with receivers on them and any light: what outlines of patches, certificates of closed meshes and shared bounds of neighbouring receivers are for, and where they have been
-// wrong.
+// Connected surfaces, fine and bumpy, with receivers on them and any light: what outlines of patches, certificates of
+// closed meshes and shared bounds of neighbouring receivers are for, and where they have been wrong.
 #include <doctest/doctest.h>
 
 #include <cmath>

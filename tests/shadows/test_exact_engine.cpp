@@ -223,7 +223,8 @@ TEST_CASE("samples that form no rows take a cell each, and rows, columns and off
   }
 }
 
-TEST_CASE("lights without a plane give the oracle's bits to receivers all around, near to them and between their samples") {
+TEST_CASE(
+    "lights without a plane give the oracle's bits to receivers all around, near to them and between their samples") {
   const std::vector<Triangle> some = random_triangles(31, 500);
   Random random(32);
   Light light = frame_light();
@@ -387,7 +388,8 @@ TEST_CASE("alpha-tested triangles before lights of any kind give the oracle's bi
     const double far = std::exp2(random.uniform(-3.0, 12.0)), size = std::exp2(random.uniform(-4.0, 5.0));
     for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
       std::array<vec2, 3> uv;
-      for (vec2& p : uv) p = vec2(dvec2(random.in_box(-far, far)) * (t % 2 ? 1.0 : 0.0) + dvec2(random.in_box(-size, size)));
+      for (vec2& p : uv)
+        p = vec2(dvec2(random.in_box(-far, far)) * (t % 2 ? 1.0 : 0.0) + dvec2(random.in_box(-size, size)));
       scene.triangle_uvs.push_back(uv);
     }
     std::vector<dvec3> points;
@@ -422,8 +424,7 @@ TEST_CASE("outlines and texels that pass through samples as near as rounding let
     config.pattern = seed % 2 ? SamplePattern::kUniform : SamplePattern::kLowDiscrepancy;
     const LightSamples samples = make_light_samples(
         light, config, make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, light_extent(light)));
-    const LocalFrame frame =
-        make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, light_extent(light));
+    const LocalFrame frame = make_local_frame(std::vector<dvec3>{{-8, -8, -8}, {8, 8, 8}}, light_extent(light));
     std::vector<Triangle> triangles;
     std::vector<dvec3> points;
     const bool textured = seed >= 6;

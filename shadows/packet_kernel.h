@@ -19,10 +19,10 @@ struct PictureLines {
   static constexpr std::size_t kLanes = 16;
   static constexpr std::uint32_t kNothing = 0x100, kMixed = 0x101;
   alignas(64) float y[SampleRows::kMaxLines][kLanes], offset[SampleRows::kMaxLines][kLanes];
-  alignas(64) float rest[SampleRows::kMaxLines][kLanes];   // 31 - offset; both plus the half that rounds upwards
+  alignas(64) float rest[SampleRows::kMaxLines][kLanes];       // 31 - offset; both plus the half that rounds upwards
   alignas(64) float row_place[SampleRows::kMaxLines][kLanes];  // SampleRows::place
-  alignas(64) float row_offset[kLanes];                    // SampleRows::row_offset
-  std::uint32_t placed = kNothing;                        // the set of all lanes; see above
+  alignas(64) float row_offset[kLanes];                        // SampleRows::row_offset
+  std::uint32_t placed = kNothing;                             // the set of all lanes; see above
 
   /// For receivers of these sets; lanes beyond `count` are like the last.
   void place(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
@@ -86,8 +86,8 @@ struct TurningTriangle {
 struct ExactScratch {
   PictureLines lines;
   PlacedSamples places;
-  SampleRows rows;                   // of a cloud, as the cluster at work sees it
-  std::vector<std::uint8_t> wanted;  // sets of its receivers
+  SampleRows rows;                                    // of a cloud, as the cluster at work sees it
+  std::vector<std::uint8_t> wanted;                   // sets of its receivers
   std::vector<std::uint32_t> stack, group;            // node stack; collected groups
   std::vector<float> low[3], high[3];                 // their boxes, light frame, padded to full vectors
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
