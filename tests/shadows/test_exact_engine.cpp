@@ -27,6 +27,20 @@ std::vector<Triangle> random_triangles(std::uint64_t seed, int count) {
   return triangles;
 }
 
+/// A wavy sheet of 3,200 triangles whose vertices are up to `noise` too high or too low.
+std::vector<Triangle> waves(Random& random, double phase, double noise) {
+  constexpr int kSide = 40;
+  std::vector<std::vector<dvec3>> p(kSide + 1, std::vector<dvec3>(kSide + 1));
+  for (int i = 0; i <= kSide; ++i) {
+    for (int j = 0; j <= kSide; ++j) {
+      const double x = 4.0 * i / kSide - 2.0, z = 4.0 * j / kSide - 2.0;
+      const double wave = 0.8 * std::sin(2.1 * x + phase) * std::cos(1.7 * z);
+      p[i][j] = {x, wave + random.uniform(-noise, noise), z};
+    }
+  }
+  return sheet(p);
+}
+
 }  // namespace
 
 TEST_CASE("the blocker tree holds every triangle once, in full leaves, inside the boxes above it") {
@@ -264,15 +278,7 @@ TEST_CASE("outlines of a bumpy surface give the oracle's bits for samples anywhe
   for (const std::uint64_t seed : {3, 4}) {
     CAPTURE(seed);
     Random random(seed);
-    constexpr int kSide = 40;
-    std::vector<std::vector<dvec3>> p(kSide + 1, std::vector<dvec3>(kSide + 1));
-    for (int i = 0; i <= kSide; ++i) {
-      for (int j = 0; j <= kSide; ++j) {
-        const double x = 4.0 * i / kSide - 2.0, z = 4.0 * j / kSide - 2.0;
-        p[i][j] = {x, 0.8 * std::sin(2.1 * x + static_cast<double>(seed)) * std::cos(1.7 * z), z};
-      }
-    }
-    const std::vector<Triangle> triangles = sheet(p);
+    const std::vector<Triangle> triangles = waves(random, static_cast<double>(seed), 0.0);
     std::vector<Receiver> receivers;
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       const auto& [a, b, c] = triangles[t];
@@ -306,16 +312,7 @@ TEST_CASE(
   for (const std::uint64_t seed : {0, 11}) {
     CAPTURE(seed);
     Random random(seed);
-    constexpr int kSide = 40;
-    std::vector<std::vector<dvec3>> p(kSide + 1, std::vector<dvec3>(kSide + 1));
-    for (int i = 0; i <= kSide; ++i) {
-      for (int j = 0; j <= kSide; ++j) {
-        const double x = 4.0 * i / kSide - 2.0, z = 4.0 * j / kSide - 2.0;
-        const double wave = 0.8 * std::sin(2.1 * x + static_cast<double>(seed)) * std::cos(1.7 * z);
-        p[i][j] = {x, wave + random.uniform(-0.03, 0.03), z};
-      }
-    }
-    const std::vector<Triangle> triangles = sheet(p);
+    const std::vector<Triangle> triangles = waves(random, static_cast<double>(seed), 0.03);
     std::vector<Receiver> receivers;
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       const auto& [a, b, c] = triangles[t];
