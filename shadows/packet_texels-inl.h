@@ -12,6 +12,8 @@
 #define HALFSHADE_PACKET_TEXELS_INL_H_
 #endif
 
+#include <cassert>
+
 #include "shadows/alpha_lookup-inl.h"
 #include "shadows/packet_anywhere-inl.h"
 
@@ -57,6 +59,13 @@ class PacketTexels {
   void ReferToLine(std::uint32_t line, std::uint32_t any);
   template <bool kWraps>
   HWY_INLINE IntVec Texel(int axis, Vec floor) const;
+  /// Sanitizers do not see what vectors gather.
+  bool IsInMap(IntVec word_at) const {
+    alignas(HWY_MAX_BYTES) std::int32_t at[kMaxLanes];
+    hn::Store(word_at, IntTag(), at);
+    return std::all_of(at, at + hn::Lanes(IntTag()),
+                       [&](std::int32_t a) { return a >= 0 && std::size_t(a) + 4 <= triangle_->map->alpha.size(); });
+  }
   template <bool kWraps>
   HWY_INLINE UintVec Lookup(std::uint32_t line, std::uint32_t any, UintVec& known) const;
 
@@ -298,6 +307,8 @@ HWY_INLINE UintVec PacketTexels::Lookup(std::uint32_t line, std::uint32_t any, U
              top = hn::Set(di, static_cast<std::int32_t>(triangle_->height) - 1);
   const auto most_clear = hn::Set(di, static_cast<std::int32_t>(triangle_->threshold) - 1);
   const Vec half = hn::Set(d, 0.5f);
+  // Receivers that ask for nothing here may see the texture wrap all the same.
+  const LaneMask usable = kWraps ? is_good_ : hn::AndNot(wraps_, is_good_);
   Vec numerator[2], denominator;
   const auto step_to = [&](const Place& place) HWY_ATTR {
     const Place away{hn::Sub(place[0], reference_[0]), hn::Sub(place[1], reference_[1]),
@@ -323,14 +334,15 @@ HWY_INLINE UintVec PacketTexels::Lookup(std::uint32_t line, std::uint32_t any, U
     const Vec u = hn::Mul(numerator[0], inverse), v = hn::Mul(numerator[1], inverse);
     const Vec floor_u = hn::Floor(u), floor_v = hn::Floor(v);
     const Vec off = hn::Max(hn::Abs(hn::Sub(hn::Sub(u, floor_u), half)), hn::Abs(hn::Sub(hn::Sub(v, floor_v), half)));
-    const LaneMask certain = hn::And(is_good_, hn::Lt(off, most_off_));
+    const LaneMask certain = hn::And(usable, hn::Lt(off, most_off_));
     const auto column = Texel<kWraps>(0, hn::IfThenElseZero(certain, floor_u)),
                row = hn::Sub(top, Texel<kWraps>(1, hn::IfThenElseZero(certain, floor_v)));
     const auto at = hn::Add(hn::Mul(row, width), column);
     // The byte is the last of a word of four, or is in the first word.
     const auto word_at = hn::Max(hn::Sub(at, hn::Set(di, 3)), hn::Zero(di));
-    const UintVec four =
-        hn::BitCast(du, hn::GatherOffset(di, alpha, hn::IfThenElseZero(hn::RebindMask(di, certain), word_at)));
+    const auto read_at = hn::IfThenElseZero(hn::RebindMask(di, certain), word_at);
+    assert(IsInMap(read_at));
+    const UintVec four = hn::BitCast(du, hn::GatherOffset(di, alpha, read_at));
     const UintVec shift = hn::ShiftLeft<3>(hn::BitCast(du, hn::Sub(at, word_at)));
     const auto byte = hn::BitCast(di, hn::And(hn::Shr(four, hn::And(shift, hn::Set(du, 31u))), hn::Set(du, 0xffu)));
     const UintVec sure = hn::IfThenElseZero(hn::RebindMask(du, certain), bit);
