@@ -79,14 +79,8 @@ struct PairLanes {
   LaneMask active, below, unknown;      // below, unknown: see BatchResult
 };
 
-/// Parallelepiped around the samples of interest, relative to the light's centre.
-struct LightRegion {
-  Vec3 offset;
-  std::array<Vec3, 3> half_axes;
-};
-
-/// Tests the planes through receiver and edges against the region; `active` lanes must not have samples elsewhere.
-HWY_INLINE BatchResult TestEdges(const PairLanes& pairs, const LightRegion& region, EdgePlanes& planes) {
+/// Tests the planes through receiver and edges against the parallelepiped around all samples.
+HWY_INLINE BatchResult TestEdges(const PairLanes& pairs, const std::array<vec3, 3>& half_axes, EdgePlanes& planes) {
   const Tag d;
   BatchResult result;
   const Vec sign = hn::IfThenElse(pairs.below, hn::Set(d, -0.0f), hn::Zero(d));
@@ -95,16 +89,15 @@ HWY_INLINE BatchResult TestEdges(const PairLanes& pairs, const LightRegion& regi
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec3 m = Cross(pairs.to_corner[k], pairs.edge[k]);
     const Vec at_center = hn::Xor(sign, Dot(m, pairs.to_center));
-    const Vec at_region = hn::Add(at_center, hn::Xor(sign, Dot(m, region.offset)));
-    Vec reach = hn::Abs(Dot(m, region.half_axes[0]));
-    reach = hn::Add(reach, hn::Abs(Dot(m, region.half_axes[1])));
-    reach = hn::Add(reach, hn::Abs(Dot(m, region.half_axes[2])));
+    Vec reach = hn::Abs(Dot(m, Splat(half_axes[0])));
+    reach = hn::Add(reach, hn::Abs(Dot(m, Splat(half_axes[1]))));
+    reach = hn::Add(reach, hn::Abs(Dot(m, Splat(half_axes[2]))));
     Vec error = hn::Mul(hn::Mul(pairs.edge_error[k], Norm1(pairs.to_corner[k])), pairs.distance);
     error = hn::Max(error, hn::Set(d, 0x1p-123f));  // keeps the reciprocal finite
     const Vec slack = hn::Add(reach, error);
-    outside = hn::Or(outside, hn::Gt(hn::Neg(slack), at_region));
-    outside_flipped = hn::Or(outside_flipped, hn::Gt(at_region, slack));
-    covered = hn::And(covered, hn::Gt(at_region, slack));
+    outside = hn::Or(outside, hn::Gt(hn::Neg(slack), at_center));
+    outside_flipped = hn::Or(outside_flipped, hn::Gt(at_center, slack));
+    covered = hn::And(covered, hn::Gt(at_center, slack));
     rejected = hn::And(outside, hn::Or(outside_flipped, hn::Not(pairs.unknown)));
     hn::Store(hn::Xor(sign, m.x), d, planes.mx[k]);
     hn::Store(hn::Xor(sign, m.y), d, planes.my[k]);
@@ -165,9 +158,7 @@ HWY_INLINE BatchResult TestBatch(const Blocker& blocker, const KernelSamples& sa
   pairs.to_center = Subtract(Splat(samples.center), r);
   pairs.distance = hn::Add(NormMax(pairs.to_center), hn::Set(d, samples.reach));
   pairs.active = active, pairs.below = below, pairs.unknown = unknown;
-  const LightRegion whole{Splat(vec3(0.0f)),
-                          {Splat(samples.half_axes[0]), Splat(samples.half_axes[1]), Splat(samples.half_axes[2])}};
-  return TestEdges(pairs, whole, planes);
+  return TestEdges(pairs, samples.half_axes, planes);
 }
 
 /// One lane's planes, scaled so that values beyond +-1 are certain. The fourth is the blocker's own plane.

@@ -159,16 +159,9 @@ HWY_INLINE Rectangle ProjectCloud(const SampleCloud& cloud, const Shaft& box) {
   return {low[0], low[1], high[0], high[1]};
 }
 
-/// Groups that the shaft of receivers [begin, end) meets, what hides most first; false where there are none and all of
+/// Groups that the shaft from a box of receivers meets, what hides most first; false where there are none and all of
 /// the receivers are lit.
-HWY_INLINE bool ListGroups(const ExactScene& scene, std::size_t begin, std::size_t end,
-                           const KernelReceivers& receivers, ExactScratch& scratch) {
-  Shaft shaft{{1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f}, {}, 0.0f};
-  for (std::size_t i = begin; i < end; ++i) {
-    const vec3 p(scene.frame.to_frame(dvec3(receivers.x[i], receivers.y[i], receivers.z[i])));
-    for (int k = 0; k < 3; ++k)
-      shaft.low[k] = std::min(shaft.low[k], p[k]), shaft.high[k] = std::max(shaft.high[k], p[k]);
-  }
+HWY_INLINE bool ListGroups(const ExactScene& scene, Shaft shaft, ExactScratch& scratch) {
   Rectangle light{scene.rows->low.x, scene.rows->low.y, scene.rows->high.x, scene.rows->high.y};
   if (scene.cloud != nullptr) light = ProjectCloud(*scene.cloud, shaft), shaft.floor = scene.cloud->low.z;
   const float pad = ProjectionPad(shaft.low[2]);

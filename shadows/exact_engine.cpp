@@ -184,13 +184,13 @@ void ScratchPool::give(ExactScratch& scratch) {
   free_.push_back(&scratch);
 }
 
-void ExactWork::reserve(std::size_t count, std::size_t words) {
+void ExactWork::reserve(std::size_t count) {
   const std::size_t padded = count + KernelReceivers::kLanePadding;
   curve.reserve(count);
   side.reserve(count), order.reserve(count);
   receivers.x.reserve(padded), receivers.y.reserve(padded), receivers.z.reserve(padded);
   receivers.own.reserve(padded), receivers.open.reserve(padded), receivers.set.reserve(padded);
-  receivers.masks.reserve(count * words), receivers.mask_at.reserve(count);
+  receivers.mask_at.reserve(count);
 }
 
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept) {

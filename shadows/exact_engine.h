@@ -72,8 +72,8 @@ struct ExactWork {
   KernelReceivers receivers;
   ScratchPool scratches;
 
-  /// Room for so many receivers with masks of so many words.
-  void reserve(std::size_t count, std::size_t words);
+  /// Room for so many receivers.
+  void reserve(std::size_t count);
 };
 
 /// What `kept` held before gives its memory.

@@ -154,7 +154,7 @@ void PacketSolver::FindPlaces() {
   if (rows_.anywhere) {
     PlaceSamples(rows_, scene_.cloud != nullptr, packet_, scratch_.places);
   } else {
-    scratch_.lines.place(rows_, packet_.set, packet_.count);
+    scratch_.lines.place(rows_, packet_.set, packet_.count, packet_.has_one_set);
   }
   if (scene_.cloud != nullptr) {
     BoundPlaces(*scene_.cloud, packet_, scratch_.places, scratch_.rows);
@@ -635,13 +635,13 @@ void ArrangeCloud(const ExactScene& scene, const ReceiverBox& box, std::span<con
 void SolvePackets(const ExactScene& given, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                   ExactScratch& scratch) {
   ExactScene scene = given;
-  if (!ListGroups(scene, begin, end, receivers, scratch)) return;
-  const std::size_t lanes = hn::Lanes(Tag());
   ReceiverBox cluster;
+  for (std::size_t i = begin; i < end; ++i) cluster.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
+  if (!ListGroups(scene, cluster.shaft, scratch)) return;
+  const std::size_t lanes = hn::Lanes(Tag());
   scratch.own_places.clear();
   const std::vector<std::uint32_t>& place = scene.tree->place;
   for (std::size_t i = begin; i < end; ++i) {
-    cluster.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
     if (receivers.own[i] < place.size() && (i == begin || receivers.own[i] != receivers.own[i - 1]))
       scratch.own_places.push_back(place[receivers.own[i]]);
   }
@@ -665,8 +665,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace halfshade {
 
-void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::size_t count) {
-  const bool alike = std::all_of(set, set + count, [&](std::uint8_t s) { return s == set[0]; });
+void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::size_t count, bool alike) {
   if (alike && placed == set[0]) return;
   for (std::uint32_t line = 0; line < rows.lines; ++line) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {

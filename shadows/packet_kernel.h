@@ -24,8 +24,8 @@ struct PictureLines {
   alignas(64) float row_offset[kLanes];                        // SampleRows::row_offset
   std::uint32_t placed = kNothing;                             // the set of all lanes; see above
 
-  /// For receivers of these sets; lanes beyond `count` are like the last.
-  void place(const SampleRows& rows, const std::uint8_t* set, std::size_t count);
+  /// For receivers of these sets, which may be `alike`; lanes beyond `count` are like the last.
+  void place(const SampleRows& rows, const std::uint8_t* set, std::size_t count, bool alike);
 };
 
 /// Where samples anywhere lie in the pictures of a packet, by SampleRows' arrays of a set.

@@ -180,7 +180,7 @@ void solve_exact_kept(const Call& call, const Light& light, KeptLight& kept, Sha
   kept.scene = scene.identity, kept.scene_version = scene.version;
   stats.build_ms = watch.lap();
   const std::size_t words = (kept.samples.count + 63) / 64;
-  w.exact.reserve(w.receivers.size(), words);
+  w.exact.reserve(w.receivers.size());
   w.masks.words.reserve(w.receivers.size() * words);
   const ExactBlockers blockers{scene.mesh, scene.config.back_face_casters ? &scene.closed : nullptr, &scene.tree};
   solve_exact(blockers, w.lit.array, light, kept.samples, call.config, kept.exact, w.exact, w.masks, stats);

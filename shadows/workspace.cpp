@@ -9,8 +9,10 @@ std::uint64_t bytes_of(const std::vector<T>& values) {
 }
 
 std::uint64_t bytes_of(const KeptLight& kept) {
-  return kept.exact.sides[0].fit.bytes() + kept.exact.sides[1].fit.bytes() + bytes_of(kept.samples.points) +
-         bytes_of(kept.samples.st) + bytes_of(kept.image.rgb) + bytes_of(kept.weights);
+  std::uint64_t bytes =
+      bytes_of(kept.samples.points) + bytes_of(kept.samples.st) + bytes_of(kept.image.rgb) + bytes_of(kept.weights);
+  for (const ExactSide& side : kept.exact.sides) bytes += side.fit.bytes() + bytes_of(side.cloud.place);
+  return bytes;
 }
 
 std::uint64_t bytes_of(const CallReceivers& r) {
@@ -25,8 +27,9 @@ std::uint64_t bytes_of(const LitReceivers& r) {
 
 std::uint64_t bytes_of(const ExactWork& work) {
   const KernelReceivers& r = work.receivers;
-  return bytes_of(work.curve.keys) + bytes_of(work.curve.scratch) + bytes_of(work.order) + bytes_of(r.x) +
-         bytes_of(r.y) + bytes_of(r.z) + bytes_of(r.own) + bytes_of(r.open) + bytes_of(r.set) + bytes_of(r.masks);
+  return bytes_of(work.curve.keys) + bytes_of(work.curve.scratch) + bytes_of(work.side) + bytes_of(work.order) +
+         bytes_of(r.x) + bytes_of(r.y) + bytes_of(r.z) + bytes_of(r.own) + bytes_of(r.open) + bytes_of(r.set) +
+         bytes_of(r.mask_at);
 }
 
 }  // namespace
