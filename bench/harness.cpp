@@ -1,10 +1,14 @@
 #include "harness.h"
 
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstdio>
+#include <thread>
 
 #include "examples/halfshade/stats_json.h"
 #include "rasterizer/core/stopwatch.h"
@@ -26,6 +30,18 @@ std::string source_version() {
 }
 
 }  // namespace
+
+int run_on_threads(const char* program, int threads, const std::function<void(int)>& work) {
+  try {
+    if (threads <= 0) threads = static_cast<int>(std::thread::hardware_concurrency());
+    tbb::task_arena arena(threads);
+    arena.execute([&] { work(threads); });
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "{}: {}\n", program, e.what());
+    return 1;
+  }
+  return 0;
+}
 
 double Timing::median() const {
   std::vector<double> sorted = ms;

@@ -26,6 +26,10 @@ std::uint64_t count_differences(const VisibilityMasks& a, const VisibilityMasks&
 
 double geometric_mean(const std::vector<double>& values);
 
+/// Runs work(threads) on so many threads of TBB, 0 for all there are. Returns the program's exit code: 1 where it
+/// throws, which goes to standard error.
+int run_on_threads(const char* program, int threads, const std::function<void(int)>& work);
+
 /// Machine, compiler, flags, version of the sources.
 nlohmann::ordered_json run_conditions(int threads);
 

@@ -1,9 +1,7 @@
 // How long does the rasterizer take per picture, for few and for many small triangles?
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <CLI/CLI.hpp>
-#include <thread>
 
 #include "harness.h"
 #include "rasterizer/rasterizer.h"
@@ -53,13 +51,6 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "Threads (0 = all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
   app.add_option("--repeat", repeat, "Repetitions")->check(CLI::Range(1, 1000))->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  try {
-    const int count = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
-    tbb::task_arena arena(count);
-    arena.execute([&] { halfshade::bench::run(blades, size, repeat, count); });
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "halfshade_raster_bench: {}\n", e.what());
-    return 1;
-  }
-  return 0;
+  return halfshade::bench::run_on_threads("halfshade_raster_bench", threads,
+                                          [&](int count) { halfshade::bench::run(blades, size, repeat, count); });
 }

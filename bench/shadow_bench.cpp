@@ -1,13 +1,11 @@
 // How long do exact masks take against tracing the same shadow rays with Embree: same receivers, same light samples,
 // one process, interleaved? README.md says what each number means.
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "bench_case.h"
 #include "examples/halfshade/scene_source.h"
@@ -346,13 +344,6 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--json", o.json, "Write all samples to this file");
   CLI11_PARSE(app, argc, argv);
-  try {
-    const int threads = o.threads > 0 ? o.threads : static_cast<int>(std::thread::hardware_concurrency());
-    tbb::task_arena arena(threads);
-    arena.execute([&] { halfshade::bench::run(o, threads); });
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "halfshade_bench: {}\n", e.what());
-    return 1;
-  }
-  return 0;
+  return halfshade::bench::run_on_threads("halfshade_bench", o.threads,
+                                          [&](int count) { halfshade::bench::run(o, count); });
 }

@@ -2,19 +2,18 @@
 // multiplies it?
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <thread>
 
 #include "bench_case.h"
 #include "examples/halfshade/scene_source.h"
 #include "harness.h"
 #include "rasterizer/core/parallel.h"
+#include "shadows/raytrace/embree_rays.h"
 #include "shadows/solver.h"
 #include "shadows/transmittance.h"
 
@@ -58,16 +57,11 @@ vec3 transmittance_of_texels(const RgbAttenuation& a) {
   return t;
 }
 
-std::uint32_t wrap(float texel, std::uint32_t size) {
-  const auto m = static_cast<int>(std::floor(texel)) % static_cast<int>(size);
-  return static_cast<std::uint32_t>(m < 0 ? m + static_cast<int>(size) : m);
-}
-
 template <class Map>
 std::array<std::uint32_t, 2> texel_at(const Map* map, const std::array<vec2, 3>& corners, float b, float c) {
   if (map == nullptr) return {};
   const vec2 at = corners[0] * (1.0f - b - c) + corners[1] * b + corners[2] * c;
-  return {wrap(at.x, map->width), map->height - 1 - wrap(at.y, map->height)};
+  return {wrap_texel(at.x, map->width), map->height - 1 - wrap_texel(at.y, map->height)};
 }
 
 /// Panes never stop a ray: they dim it.
@@ -267,13 +261,6 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "Threads (0 = all cores)")->check(CLI::Range(0, 1024))->capture_default_str();
   app.add_option("--repeat", repeat, "Repetitions")->check(CLI::Range(1, 1000))->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  try {
-    const int count = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
-    tbb::task_arena arena(count);
-    arena.execute([&] { halfshade::bench::run(scenes, size, repeat, count); });
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "halfshade_transmittance_bench: {}\n", e.what());
-    return 1;
-  }
-  return 0;
+  return halfshade::bench::run_on_threads("halfshade_transmittance_bench", threads,
+                                          [&](int count) { halfshade::bench::run(scenes, size, repeat, count); });
 }

@@ -2,12 +2,12 @@
 #include "papers.h"
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
-#include <thread>
+
+#include "bench/harness.h"
 
 namespace halfshade::bench {
 namespace {
@@ -51,16 +51,9 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   for (const auto& paper : papers()) app.add_subcommand(paper.name, paper.title);
   CLI11_PARSE(app, argc, argv);
-  try {
-    tbb::task_arena arena(o.threads);
-    arena.execute([&] {
-      for (const auto& paper : papers()) {
-        if (app.got_subcommand(paper.name)) paper.run(o);
-      }
-    });
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "halfshade_paper_bench: {}\n", e.what());
-    return 1;
-  }
-  return 0;
+  return halfshade::bench::run_on_threads("halfshade_paper_bench", o.threads, [&](int) {
+    for (const auto& paper : papers()) {
+      if (app.got_subcommand(paper.name)) paper.run(o);
+    }
+  });
 }

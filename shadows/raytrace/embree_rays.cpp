@@ -67,11 +67,6 @@ struct TriangleTexture {
   std::array<vec2, 3> texel;  // v counted from the picture's bottom
 };
 
-std::uint32_t wrap(float texel, std::uint32_t size) {
-  const auto m = static_cast<int>(std::floor(texel)) % static_cast<int>(size);
-  return static_cast<std::uint32_t>(m < 0 ? m + static_cast<int>(size) : m);
-}
-
 /// Embree's callback at hits of alpha-tested triangles: a hit on a transparent texel does not count.
 void alpha_filter(const RTCFilterFunctionNArguments* args) {
   const auto* textures = static_cast<const TriangleTexture*>(args->geometryUserPtr);
@@ -80,7 +75,7 @@ void alpha_filter(const RTCFilterFunctionNArguments* args) {
     const TriangleTexture& t = textures[RTCHitN_primID(args->hit, args->N, i)];
     const float b = RTCHitN_u(args->hit, args->N, i), c = RTCHitN_v(args->hit, args->N, i);
     const vec2 at = t.texel[0] * (1.0f - b - c) + t.texel[1] * b + t.texel[2] * c;
-    const std::uint32_t x = wrap(at.x, t.map->width), y = t.map->height - 1 - wrap(at.y, t.map->height);
+    const std::uint32_t x = wrap_texel(at.x, t.map->width), y = t.map->height - 1 - wrap_texel(at.y, t.map->height);
     if (t.map->alpha[std::size_t{y} * t.map->width + x] < t.threshold) args->valid[i] = 0;
   }
 }

@@ -2,6 +2,7 @@
 // fastest ways.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -55,6 +56,12 @@ class EmbreeRays {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// The texel of a repeated texture, in float as a user of rays would look it up.
+inline std::uint32_t wrap_texel(float texel, std::uint32_t size) {
+  const auto m = static_cast<int>(std::floor(texel)) % static_cast<int>(size);
+  return static_cast<std::uint32_t>(m < 0 ? m + static_cast<int>(size) : m);
+}
 
 /// Is Embree part of this program?
 bool embree_available();
