@@ -120,7 +120,9 @@ HWY_INLINE void SortGroups(const Shaft& shaft, ExactScratch& scratch) {
       const float b = std::min(r[axis] + (scratch.high[axis][i] - r[axis]) * k, light_high[axis]);
       area *= std::max(b - a, 0.0f);
     }
-    scratch.keys.emplace_back(-area, i);
+    float& gain = scratch.gain[scratch.group[i]];
+    scratch.keys.emplace_back(gain > 0.0f ? -100.0f - gain : -area, i);
+    gain *= 0.25f;
   }
   std::sort(scratch.keys.begin(), scratch.keys.end());
   const auto reorder = [&](auto& values, auto& old) {

@@ -154,7 +154,7 @@ void ScratchPool::start(std::size_t threads, std::size_t nodes, const ExactLight
   free_.clear();
   for (const auto& s : scratches_) {
     s->stack.reserve(nodes), s->group.reserve(groups), s->keys.reserve(groups);
-    s->groups.reserve(nodes), s->own_places.reserve(kCluster), s->net_edges.reserve(edges);
+    s->groups.reserve(nodes), s->gain.assign(nodes, 0.0f), s->own_places.reserve(kCluster), s->net_edges.reserve(edges);
     s->facing.reserve(facing), s->turning.reserve(turning);
     s->old_group.reserve(groups), s->old_bound.reserve(groups);
     for (int k = 0; k < 3; ++k) s->low[k].reserve(groups), s->high[k].reserve(groups);

@@ -42,7 +42,9 @@ class PacketSolver {
         const std::size_t at = i + static_cast<std::size_t>(std::countr_zero(bits));
         if (!RasterizeGroup(scene_.fit->nodes[scratch_.group[at]], scratch_.groups[at])) continue;
         any = true;
-        if (!FindOpenPart()) {
+        const bool is_open = FindOpenPart();
+        scratch_.gain[scratch_.group[at]] += gain_;
+        if (!is_open) {
           StoreMasks();
           return;
         }
@@ -103,6 +105,7 @@ class PacketSolver {
   KernelCounters& counters_;
   Packet packet_;
   LineSet changed_lines_;
+  float gain_ = 0.0f;  // of the group at work
   PictureRanges leaf_ranges_;                 // of the group at work
   LeafView views_[BlockerTree::kWidth];       // of its leaves
   std::uint32_t viewed_ = 0;                  // those that are there
@@ -168,10 +171,12 @@ void PacketSolver::FindPlaces() {
 /// What some receiver has open, after lines changed; false where nothing is.
 bool PacketSolver::FindOpenPart() {
   std::uint32_t columns[2] = {0, 0}, first = ~0u, last = 0;
+  gain_ = 0.0f;
   for (std::uint32_t line = 0; line < rows_.lines; ++line) {
     if (changed_lines_.has(line)) {
       std::uint32_t all = 0;
       for (std::size_t k = 0; k < hn::Lanes(Tag()); ++k) all |= packet_.open[line][k];
+      gain_ += static_cast<float>(1 + std::popcount(packet_.any_open[line] & ~all));
       packet_.any_open[line] = all;
     }
     if (packet_.any_open[line] == 0) continue;

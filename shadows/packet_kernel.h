@@ -93,6 +93,7 @@ struct ExactScratch {
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
   std::vector<std::uint32_t> old_group;               // what is being sorted
   std::vector<float> old_bound;
+  std::vector<float> gain;  // [node] what a group hid of late from the receivers that met it, in samples
   std::vector<GroupView> groups;          // of those listed in `group`
   std::vector<std::uint32_t> own_places;  // BlockerTree::place of the receivers' own triangles
   NetEdges net_edges;
