@@ -51,7 +51,7 @@ void add_counters(const ScratchPool& scratches, ShadowStats& stats) {
     total.add(s->counters);
     stats.leaves_listed += s->leaves_listed;
     stats.leaves_tested += s->leaves_tested;
-    stats.clusters_lit += s->clusters_lit;
+    stats.clusters_lit += s->clusters_lit, stats.clusters_by_sample += s->clusters_by_sample;
   }
   add_to_stats(total, stats);
 }
@@ -97,11 +97,12 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   fit_side(blockers, samples, side);
   stats.cull_ms += watch.lap();
   const SampleCloud* const cloud = kept.bound.flat ? nullptr : &side.cloud;
-  const ExactScene scene{blockers.tree, &side.fit, &samples, &kept.rows, cloud, side.frame};
+  const bool beams = kept.tiles.count != 0 && side.fit.alpha.empty();
+  const ExactScene scene{blockers.tree, &side.fit, &samples,   beams ? &kept.tiles : nullptr,
+                         &kept.rows,    cloud,     side.frame, work.beams};
   constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
-  const std::size_t nodes = blockers.tree->nodes.size();
-  work.scratches.start(concurrency(), nodes, kept);
+  work.scratches.start(concurrency(), *blockers.tree, kept, beams);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
@@ -109,7 +110,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
       const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
       for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
         check_run();
-        solve_packets(scene, begin, std::min(task_end, begin + kCluster), kernel, *scratch);
+        solve_cluster(scene, begin, std::min(task_end, begin + kCluster), kernel, *scratch);
       }
     });
   }
@@ -140,7 +141,8 @@ void solve_grazing(const LatticeMesh& mesh, const ReceiverArray& receivers, cons
 
 }  // namespace
 
-void ScratchPool::start(std::size_t threads, std::size_t nodes, const ExactLight& light) {
+void ScratchPool::start(std::size_t threads, const BlockerTree& tree, const ExactLight& light, bool beams) {
+  const std::size_t nodes = tree.nodes.size();
   while (scratches_.size() < threads) scratches_.push_back(std::make_unique<ExactScratch>());
   const std::size_t groups = nodes + KernelReceivers::kLanePadding;
   std::size_t edges = 0, facing = 0, turning = 0;
@@ -160,9 +162,10 @@ void ScratchPool::start(std::size_t threads, std::size_t nodes, const ExactLight
     for (int k = 0; k < 3; ++k) s->low[k].reserve(groups), s->high[k].reserve(groups);
     if (is_cloud || light.samples.sets > 1) s->places.place.reserve(cells), s->places.bounds.reserve(cells);
     if (is_cloud) s->rows.reserve_cells(light.samples.sets, cells), s->wanted.reserve(light.samples.sets);
+    if (beams) s->beams.reserve(tree.leaves.size(), light.samples.count);
     s->lines.placed = PictureLines::kNothing;
     s->counters = {};
-    s->leaves_listed = s->leaves_tested = s->clusters_lit = 0;
+    s->leaves_listed = s->leaves_tested = s->clusters_lit = s->clusters_by_sample = 0;
     free_.push_back(s.get());
   }
 }
@@ -212,6 +215,11 @@ void prepare_exact_samples(const LightSamples& samples, ExactLight& kept) {
     if (!samples.flat) side.cloud = make_sample_cloud(kept.samples, side.frame, std::move(side.cloud));
   }
   if (samples.flat) kept.rows = find_sample_rows(samples, kept.samples, kept.front, std::move(kept.rows));
+  if (samples.flat && samples.sets == 1) {
+    kept.tiles = make_kernel_samples(samples, kept.bound, SampleOrder::kNeighboursTogether, std::move(kept.tiles));
+  } else {
+    kept.tiles.count = 0;
+  }
 }
 
 void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, const Light& light,

@@ -38,6 +38,7 @@ struct ExactLight {
   LightBound bound;
   LightFrame front;
   KernelSamples samples;
+  KernelSamples tiles;    // the same, neighbours together, of lights that take beams (cluster_beams-inl.h)
   SampleRows rows;        // of flat lights
   std::size_t count = 0;  // sides that receivers may be on
   std::array<ExactSide, 6> sides;
@@ -51,9 +52,9 @@ struct ExactLight {
 /// One for each thread at work, kept from call to call.
 class ScratchPool {
  public:
-  /// Room for so many threads, for a tree of so many nodes and for the samples of `light`; nothing is left of earlier
-  /// calls but memory, the same for all: which cluster meets which scratch changes from call to call.
-  void start(std::size_t threads, std::size_t nodes, const ExactLight& light);
+  /// Room for so many threads, for the tree and for the samples of `light`; nothing is left of earlier calls but what
+  /// they took and memory, the same for all: which cluster meets which scratch changes from call to call.
+  void start(std::size_t threads, const BlockerTree& tree, const ExactLight& light, bool beams);
   ExactScratch& take();
   void give(ExactScratch& scratch);
   const std::vector<std::unique_ptr<ExactScratch>>& all() const { return scratches_; }
@@ -71,6 +72,7 @@ struct ExactWork {
   std::vector<std::uint32_t> order;
   KernelReceivers receivers;
   ScratchPool scratches;
+  Beams beams = Beams::kWhereCheaper;
 
   /// Room for so many receivers.
   void reserve(std::size_t count);

@@ -5,12 +5,14 @@
 // What is decided once for the whole packet: which leaves, which of a leaf's triangles (16 at a time), which rows.
 #include <optional>
 
+#include "rasterizer/core/stopwatch.h"
 #include "shadows/packet_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shadows/packet_kernel.cpp"
 #include <hwy/foreach_target.h>
 
+#include "shadows/cluster_beams-inl.h"
 #include "shadows/packet_texels-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -105,7 +107,7 @@ class PacketSolver {
   KernelCounters& counters_;
   Packet packet_;
   LineSet changed_lines_;
-  float gain_ = 0.0f;  // of the group at work
+  float gain_ = 0.0f;                         // of the group at work
   PictureRanges leaf_ranges_;                 // of the group at work
   LeafView views_[BlockerTree::kWidth];       // of its leaves
   std::uint32_t viewed_ = 0;                  // those that are there
@@ -637,12 +639,10 @@ void ArrangeCloud(const ExactScene& scene, const ReceiverBox& box, std::span<con
   arrange_cloud(*scene.cloud, *scene.samples, scene.frame, middle, scratch.wanted, scratch.rows);
 }
 
-void SolvePackets(const ExactScene& given, std::size_t begin, std::size_t end, KernelReceivers& receivers,
-                  ExactScratch& scratch) {
+/// The cluster packet by packet.
+void SolveByPackets(const ExactScene& given, const ReceiverBox& cluster, std::size_t begin, std::size_t end,
+                    KernelReceivers& receivers, ExactScratch& scratch) {
   ExactScene scene = given;
-  ReceiverBox cluster;
-  for (std::size_t i = begin; i < end; ++i) cluster.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
-  if (!ListGroups(scene, cluster.shaft, scratch)) return;
   const std::size_t lanes = hn::Lanes(Tag());
   scratch.own_places.clear();
   const std::vector<std::uint32_t>& place = scene.tree->place;
@@ -663,6 +663,22 @@ void SolvePackets(const ExactScene& given, std::size_t begin, std::size_t end, K
   for (std::size_t i = begin; i < end; i += lanes) solver.Solve(i, std::min(lanes, end - i));
 }
 
+void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+                  ExactScratch& scratch) {
+  ReceiverBox cluster;
+  for (std::size_t i = begin; i < end; ++i) cluster.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
+  if (!ListGroups(scene, cluster.shaft, scratch)) return;
+  const BeamChoice::Cluster work{end - begin, scratch.group.size(), scene.samples->count};
+  const bool takes_beams = scene.tiles != nullptr && scratch.choice.takes_beams(work, scene.beams);
+  Stopwatch watch;
+  if (takes_beams) {
+    BeamSolver(scene, cluster, receivers, scratch).Solve(begin, end);
+    ++scratch.clusters_by_sample;
+  } else {
+    SolveByPackets(scene, cluster, begin, end, receivers, scratch);
+  }
+  scratch.choice.took(work, takes_beams, watch.lap());
+}
 }  // namespace HWY_NAMESPACE
 }  // namespace halfshade
 HWY_AFTER_NAMESPACE();
@@ -684,11 +700,45 @@ void PictureLines::place(const SampleRows& rows, const std::uint8_t* set, std::s
   placed = alike ? set[0] : kMixed;
 }
 
-HWY_EXPORT(SolvePackets);
+void BeamScratch::Slopes::resize(std::size_t count) {
+  for (int k = 0; k < 2; ++k) low[k].resize(count), high[k].resize(count);
+  near.resize(count), far.resize(count);
+}
 
-void solve_packets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+void BeamScratch::Slopes::reserve(std::size_t count) {
+  for (int k = 0; k < 2; ++k) low[k].reserve(count), high[k].reserve(count);
+  near.reserve(count), far.reserve(count);
+}
+
+void BeamScratch::reserve(std::size_t leaves, std::size_t samples) {
+  leaves += PictureLines::kLanes;
+  leaf.reserve(leaves), is_tight.reserve(leaves), leaf_slopes.reserve(leaves);
+  for (int k = 0; k < 3; ++k) leaf_low[k].reserve(leaves), leaf_high[k].reserve(leaves);
+  blocked.reserve(samples * kRuns);
+}
+
+void BeamScratch::clear_leaves() {
+  leaf.clear();
+  for (int k = 0; k < 3; ++k) leaf_low[k].clear(), leaf_high[k].clear();
+}
+
+void BeamScratch::add_leaf(const BlockerTree::Node& group, std::size_t child) {
+  leaf.push_back(group.first_leaf() + static_cast<std::uint32_t>(child));
+  for (int k = 0; k < 3; ++k) leaf_low[k].push_back(group.low[k][child]), leaf_high[k].push_back(group.high[k][child]);
+}
+
+void BeamScratch::pad_leaves() {
+  const std::size_t padded = leaf.size() + PictureLines::kLanes;
+  for (int k = 0; k < 3; ++k) leaf_low[k].resize(padded, 1e30f), leaf_high[k].resize(padded, -1e30f);
+  leaf_slopes.resize(padded);
+  is_tight.assign(padded, 0);
+}
+
+HWY_EXPORT(SolveCluster);
+
+void solve_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                    ExactScratch& scratch) {
-  HWY_DYNAMIC_DISPATCH(SolvePackets)(scene, begin, end, receivers, scratch);
+  HWY_DYNAMIC_DISPATCH(SolveCluster)(scene, begin, end, receivers, scratch);
 }
 
 }  // namespace halfshade

@@ -1,6 +1,7 @@
 // Hot loop of the exact engine: one cluster of receivers against a tree of blockers (packet_kernel.cpp).
 #pragma once
 
+#include "shadows/beam_choice.h"
 #include "shadows/sample_rows.h"
 
 namespace halfshade {
@@ -9,9 +10,11 @@ struct ExactScene {
   const BlockerTree* tree = nullptr;
   const BlockerFit* fit = nullptr;  // of the tree, to the samples
   const KernelSamples* samples = nullptr;
+  const KernelSamples* tiles = nullptr;  // the same, neighbours together; null: no beams
   const SampleRows* rows = nullptr;
   const SampleCloud* cloud = nullptr;  // of samples that lie in no plane: `rows` are made for each cluster
   LightFrame frame;
+  Beams beams = Beams::kWhereCheaper;
 };
 
 /// Where the lines of the picture lie, [line][receiver of a packet].
@@ -82,6 +85,38 @@ struct TurningTriangle {
   bool samples_above, samples_below;
 };
 
+/// Scratch of beams (cluster_beams-inl.h). A run is 16 receivers.
+struct BeamScratch {
+  static constexpr std::size_t kRuns = 16, kReceivers = 16 * kRuns;
+
+  /// Slopes x / z, y / z of boxes from the middle of some samples, and 1 / z of where they are nearest and farthest.
+  struct Slopes {
+    std::vector<float> low[2], high[2], near, far;
+    void resize(std::size_t count);
+    void reserve(std::size_t count);
+  };
+  // Of the receivers, light's frame: x / z, y / z, z and 1 / z; slopes from the sample at work.
+  alignas(64) float x[kReceivers], y[kReceivers], height[kReceivers], inverse[kReceivers], slope[2][kReceivers];
+  alignas(64) std::uint32_t own[kReceivers],
+      leaf_to_skip[kReceivers];                     // BlockerTree::place; a leaf that cannot block it
+  alignas(64) float low[3][kRuns], high[3][kRuns];  // boxes of the runs, light's frame
+  vec3 box_low[kRuns], box_high[kRuns];             // lattice
+  std::uint16_t valid[kRuns];                       // bits of receivers
+  Slopes run_slopes, leaf_slopes;
+  // Leaves that the samples at work may see before the cluster, their boxes, and whether their slopes are of corners.
+  std::vector<std::uint32_t> leaf;
+  std::vector<float> leaf_low[3], leaf_high[3];
+  std::vector<std::uint8_t> is_tight;
+  std::vector<std::uint16_t> blocked;  // [sample][run]: bits of receivers
+
+  BeamScratch() { run_slopes.resize(kRuns); }
+  void reserve(std::size_t leaves, std::size_t samples);
+  void clear_leaves();
+  void add_leaf(const BlockerTree::Node& group, std::size_t child);
+  /// Boxes that nothing meets up to full vectors; room for slopes.
+  void pad_leaves();
+};
+
 /// Scratch of one thread, and what it counted.
 struct ExactScratch {
   PictureLines lines;
@@ -93,7 +128,7 @@ struct ExactScratch {
   std::vector<std::pair<float, std::uint32_t>> keys;  // for sorting
   std::vector<std::uint32_t> old_group;               // what is being sorted
   std::vector<float> old_bound;
-  std::vector<float> gain;  // [node] what a group hid of late from the receivers that met it, in samples
+  std::vector<float> gain;                // [node] what a group hid of late from the receivers that met it, in samples
   std::vector<GroupView> groups;          // of those listed in `group`
   std::vector<std::uint32_t> own_places;  // BlockerTree::place of the receivers' own triangles
   NetEdges net_edges;
@@ -102,13 +137,15 @@ struct ExactScratch {
   // from below, so that its outline is positive; from 0 on those that see it from above. All or none where a triangle
   // does not turn.
   std::vector<std::uint32_t> facing;
+  BeamScratch beams;
+  BeamChoice choice;
   KernelCounters counters;
-  std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0;
+  std::uint64_t leaves_listed = 0, leaves_tested = 0, clusters_lit = 0, clusters_by_sample = 0;
 };
 
-/// Solves receivers [begin, end), which should lie near each other. All in front of the light (z > 0 in its frame);
-/// samples must be in sample order.
-void solve_packets(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
+/// Solves receivers [begin, end), which should lie near each other, at most 256. All in front of the light (z > 0 in
+/// its frame); samples must be in sample order.
+void solve_cluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                    ExactScratch& scratch);
 
 }  // namespace halfshade

@@ -164,7 +164,8 @@ void add_stats(const ShadowStats& light, SolveStats& all) {
   all.lists_longest = std::max(all.lists_longest, light.lists_longest);
   all.certified_blockers = light.certified_blockers;
   all.leaves_listed += light.leaves_listed, all.leaves_tested += light.leaves_tested;
-  all.clusters_lit += light.clusters_lit, all.everywhere_blockers += light.everywhere_blockers;
+  all.clusters_lit += light.clusters_lit, all.clusters_by_sample += light.clusters_by_sample;
+  all.everywhere_blockers += light.everywhere_blockers;
   all.bytes = std::max(all.bytes, light.bytes);
 }
 

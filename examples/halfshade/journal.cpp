@@ -28,10 +28,10 @@ void add_stats(const ShadowStats& more, ShadowStats& sum) {
   for (const auto member :
        {&ShadowStats::build_ms, &ShadowStats::index_ms, &ShadowStats::cull_ms, &ShadowStats::test_ms})
     sum.*member += more.*member;
-  for (const auto member :
-       {&ShadowStats::receivers, &ShadowStats::pairs_tested, &ShadowStats::pairs_sampled, &ShadowStats::pairs_necessary,
-        &ShadowStats::sample_tests, &ShadowStats::exact_fallbacks, &ShadowStats::lists_occupied,
-        &ShadowStats::leaves_listed, &ShadowStats::leaves_tested, &ShadowStats::clusters_lit})
+  for (const auto member : {&ShadowStats::receivers, &ShadowStats::pairs_tested, &ShadowStats::pairs_sampled,
+                            &ShadowStats::pairs_necessary, &ShadowStats::sample_tests, &ShadowStats::exact_fallbacks,
+                            &ShadowStats::lists_occupied, &ShadowStats::leaves_listed, &ShadowStats::leaves_tested,
+                            &ShadowStats::clusters_lit, &ShadowStats::clusters_by_sample})
     sum.*member += more.*member;
   for (const auto member : {&ShadowStats::triangles, &ShadowStats::lists_longest, &ShadowStats::certified_blockers,
                             &ShadowStats::everywhere_blockers, &ShadowStats::bytes})

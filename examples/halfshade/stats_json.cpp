@@ -64,6 +64,7 @@ nlohmann::ordered_json stats_json(const ShadowStats& s) {
           {"leaves_listed", s.leaves_listed},
           {"leaves_tested", s.leaves_tested},
           {"clusters_lit", s.clusters_lit},
+          {"clusters_by_sample", s.clusters_by_sample},
           {"everywhere_blockers", s.everywhere_blockers},
           {"bytes", s.bytes},
           {"details", details}};

@@ -92,6 +92,7 @@ struct ShadowStats {
   std::uint64_t certified_blockers = 0;                // triangles of closed meshes that cast by their back faces alone
   std::uint64_t leaves_listed = 0, leaves_tested = 0;  // exact: per cluster; per receiver
   std::uint64_t clusters_lit = 0;                      // exact: clusters proved lit by an empty list
+  std::uint64_t clusters_by_sample = 0;                // exact: clusters solved sample by sample, which was cheaper
   std::uint64_t everywhere_blockers = 0;               // triangles without a bounded influence region
   std::uint64_t bytes = 0;                             // working memory of the method, without masks
   /// What only one method counts or assumes: "hpc.penumbra_volumes", 1234. In the order they were noted.

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "support/lit_scene.h"
+#include "support/exact_ways.h"
 
 using namespace halfshade;
 using namespace halfshade::test;
@@ -175,12 +175,10 @@ void check_cases(std::uint64_t first, std::uint64_t count, std::uint64_t every, 
     Case c = make_case(seed);
     if (any_light) change_light(seed, c);
     const Scene scene = scene_of(c.triangles);
-    if (seed % every == 0) {
-      CHECK(wrong_bits_of_exact_methods(scene, c.receivers, c.light, c.config) == 0);
-    } else {
-      CHECK(wrong_bits(solve(scene, c.receivers, c.light, c.config, ShadowMethod::kExact),
-                       solve(scene, c.receivers, c.light, c.config, ShadowMethod::kOracle)) == 0);
-    }
+    if (seed % every == 0) CHECK(wrong_bits_of_exact_methods(scene, c.receivers, c.light, c.config) == 0);
+    const VisibilityMasks truth = solve(scene, c.receivers, c.light, c.config, ShadowMethod::kOracle);
+    for (const Beams beams : {Beams::kNever, Beams::kAlways})
+      CHECK(wrong_bits(solve_exact_by(beams, scene, c.receivers, c.light, c.config), truth) == 0);
   }
 }
 

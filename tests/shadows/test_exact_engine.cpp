@@ -8,7 +8,7 @@
 #include "shadows/blocker_tree.h"
 #include "shadows/exact_engine.h"
 #include "shadows/light_view.h"
-#include "support/lit_scene.h"
+#include "support/exact_ways.h"
 
 using namespace halfshade;
 using namespace halfshade::test;
@@ -454,5 +454,75 @@ TEST_CASE("outlines and texels that pass through samples as near as rounding let
     const VisibilityMasks truth = solve(scene, receivers_at(points), light, config, ShadowMethod::kOracle);
     CHECK(wrong_bits(solve(scene, receivers_at(points), light, config, ShadowMethod::kExact, &stats), truth) == 0);
     CHECK(stats.exact_fallbacks > 100);
+    if (textured) continue;
+    ShadowStats by_beams;
+    CHECK(wrong_bits(solve_exact_by(Beams::kAlways, scene, receivers_at(points), light, config, &by_beams), truth) ==
+          0);
+    CHECK((by_beams.clusters_by_sample > 0) == samples.flat);
+    CHECK(by_beams.exact_fallbacks > 100);
   }
+}
+
+TEST_CASE("beams give the oracle's bits to receivers anywhere, on triangles that hold the light's centre or lie flat") {
+  Random random(41);
+  std::vector<Triangle> triangles = random_triangles(42, 800);
+  triangles = joined(triangles, box({-1.5, -2.0, -1.5}, {-0.5, -1.0, -0.5}));
+  for (int i = 0; i < 12; ++i) {  // a floor whose triangles share a plane, and planes through the middle of the light
+    const double x = -3.0 + 0.5 * i;
+    triangles.push_back({dvec3(x, -3, -3), dvec3(x + 0.5, -3, -3), dvec3(x, -3, 3)});
+    triangles.push_back({dvec3(x + 0.5, -3, -3), dvec3(x + 0.5, -3, 3), dvec3(x, -3, 3)});
+    const dvec3 away = random.in_box(-1.0, 1.0);
+    triangles.push_back({frame_light().center, frame_light().center + 4.0 * away, away});
+  }
+  const Scene scene = scene_of(triangles);
+  std::vector<Receiver> receivers = receivers_at({});
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {  // on all triangles, in their plane as near as rounding allows
+    const auto& [a, b, c] = triangles[t];
+    receivers.push_back({0.4 * a + 0.35 * b + 0.25 * c, t});
+  }
+  for (int i = 0; i < 400; ++i) receivers.push_back({random.in_box(-4.0, 4.0), kNone});
+  for (int i = 0; i < 40; ++i) receivers.push_back({random.in_box(-0.45, 0.45) + dvec3(-1.0, -1.5, -1.0), kNone});
+  for (int i = 0; i < 60; ++i) {  // near the light's plane
+    const Light light = frame_light();
+    receivers.push_back({light.center + random.uniform(-2.0, 2.0) * light.u + random.uniform(-2.0, 2.0) * light.v +
+                             random.uniform(-1e-3, 1e-3) * glm::cross(light.u, light.v),
+                         kNone});
+  }
+  for (const std::uint32_t count : {1u, 15u, 100u, 1024u}) {
+    for (const SamplePattern pattern : {SamplePattern::kRows, SamplePattern::kLowDiscrepancy}) {
+      CAPTURE(count);
+      CAPTURE(static_cast<int>(pattern));
+      Light light = frame_light();
+      light.two_sided = count != 15;
+      light.shape = count == 100 ? LightShape::kDisk : LightShape::kRectangle;
+      light.radius = 1.5, light.normal = glm::cross(light.u, light.v);
+      ShadowConfig config = frame_config(count);
+      config.pattern = pattern;
+      ShadowStats stats;
+      const VisibilityMasks masks = solve_exact_by(Beams::kAlways, scene, receivers, light, config, &stats);
+      CHECK(wrong_bits(masks, solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
+      CHECK(stats.clusters_by_sample > 3);
+    }
+  }
+}
+
+TEST_CASE("beams are for clusters that packets take longer for, and what was left is tried again") {
+  const BeamChoice::Cluster wide{256, 400, 256}, narrow{256, 4, 256};
+  BeamChoice choice;
+  CHECK_FALSE(choice.takes_beams(wide, Beams::kWhereCheaper));  // nothing is known yet
+  CHECK(choice.takes_beams(narrow, Beams::kAlways));
+  const auto run = [&](const BeamChoice::Cluster& cluster, double packet_ms, double beam_ms) {
+    int beams = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const bool takes = choice.takes_beams(cluster, Beams::kWhereCheaper);
+      choice.took(cluster, takes, takes ? beam_ms : packet_ms);
+      beams += takes;
+    }
+    return beams;
+  };
+  CHECK(run(wide, 30.0, 5.0) > 950);
+  CHECK(run(wide, 30.0, 5.0) < 1000);  // packets are tried again
+  CHECK(run(wide, 5.0, 30.0) < 50);
+  CHECK(run(narrow, 0.5, 5.0) == 0);
+  CHECK(run(wide, 30.0, 5.0) > 900);
 }
