@@ -13,7 +13,7 @@
 namespace halfshade {
 namespace {
 
-constexpr std::size_t kCluster = 256;  // receivers that share a list of leaves
+constexpr std::size_t kCluster = BeamScratch::kReceivers;  // that share a list of groups
 constexpr std::size_t kClustersPerTask = 2;
 
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.

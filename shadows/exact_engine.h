@@ -3,7 +3,8 @@
 // The methods of the papers loop over triangles and pay for every (blocker, receiver) pair; tracing rays loops over
 // samples and pays for every one. Here neighbouring receivers form clusters; a cluster collects the leaves that its
 // shaft to the light meets; packets of receivers test them, what hides most first, against the part of the light that
-// nothing has blocked yet, and stop when there is none.
+// nothing has blocked yet, and stop when there is none. Clusters that see too many small parts go sample by sample
+// instead (cluster_beams-inl.h).
 #pragma once
 
 #include <memory>

@@ -157,7 +157,7 @@ std::vector<Shortcut> list_shortcuts(const LatticeMesh& scene_mesh, const Receiv
   all.push_back({"lit clusters",
                  stats.clusters_lit > 0,
                  stats.clusters_lit,
-                 (receivers.size() + 63) / 64,
+                 (receivers.size() + 255) / 256,
                  "clusters",
                  {},
                  "no blocker's box in the shaft to the light; over all rounds with --max-error"});
