@@ -103,7 +103,8 @@ HWY_INLINE void CollectGroups(const BlockerFit& fit, const Shaft& shaft, ExactSc
   }
 }
 
-/// Largest share of the light first: what hides much is tested before what hides little.
+/// What hides much is tested before what hides little: first the groups that hid something from the last cluster, most
+/// of it first, then those whose box covers the largest share of the light.
 HWY_INLINE void SortGroups(const Shaft& shaft, ExactScratch& scratch) {
   const std::size_t count = scratch.group.size();
   scratch.keys.clear();
@@ -120,9 +121,10 @@ HWY_INLINE void SortGroups(const Shaft& shaft, ExactScratch& scratch) {
       const float b = std::min(r[axis] + (scratch.high[axis][i] - r[axis]) * k, light_high[axis]);
       area *= std::max(b - a, 0.0f);
     }
+    constexpr float kAboveAnyArea = 100.0f;  // coordinates are below 4
     float& gain = scratch.gain[scratch.group[i]];
-    scratch.keys.emplace_back(gain > 0.0f ? -100.0f - gain : -area, i);
-    gain *= 0.25f;
+    scratch.keys.emplace_back(gain > 0.0f ? -kAboveAnyArea - gain : -area, i);
+    gain = gain < 0.5f ? 0.0f : 0.25f * gain;
   }
   std::sort(scratch.keys.begin(), scratch.keys.end());
   const auto reorder = [&](auto& values, auto& old) {
@@ -174,6 +176,7 @@ HWY_INLINE bool ListGroups(const ExactScene& scene, Shaft shaft, ExactScratch& s
     ++scratch.clusters_lit;
     return false;
   }
+  scratch.gain.resize(scene.fit->nodes.size());  // of a thread that nobody expected
   SortGroups(shaft, scratch);
   return true;
 }

@@ -679,6 +679,7 @@ void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, K
   }
   scratch.choice.took(work, takes_beams, watch.lap());
 }
+
 }  // namespace HWY_NAMESPACE
 }  // namespace halfshade
 HWY_AFTER_NAMESPACE();
