@@ -218,6 +218,7 @@ void BeamSolver::Begin(std::size_t begin, std::size_t end) {
   const std::vector<std::uint32_t>& place = scene_.tree->place;
   for (auto& axis : beams_.low) std::fill_n(axis, kRuns, 1e30f);
   for (auto& axis : beams_.high) std::fill_n(axis, kRuns, -1e30f);
+  std::fill_n(beams_.box_low, kRuns, vec3(1e30f)), std::fill_n(beams_.box_high, kRuns, vec3(-1e30f));
   std::fill_n(beams_.valid, kRuns, std::uint16_t{0});
   for (std::size_t i = 0; i < kMostReceivers; ++i) {
     const std::size_t at = std::min(i, count_ - 1), run = i / kRun;
@@ -232,9 +233,7 @@ void BeamSolver::Begin(std::size_t begin, std::size_t end) {
       const std::uint32_t leaf = beams_.own[i] / BlockerTree::kWidth;
       if (!CanBlockOwn(i, scene_.tree->leaves[leaf], scene_.fit->leaves[leaf])) beams_.leaf_to_skip[i] = leaf;
     }
-    vec3& low = i % kRun == 0 ? beams_.box_low[run] = r : beams_.box_low[run];
-    vec3& high = i % kRun == 0 ? beams_.box_high[run] = r : beams_.box_high[run];
-    low = glm::min(low, r), high = glm::max(high, r);
+    beams_.box_low[run] = glm::min(beams_.box_low[run], r), beams_.box_high[run] = glm::max(beams_.box_high[run], r);
     for (int k = 0; k < 3; ++k) {
       beams_.low[k][run] = std::min(beams_.low[k][run], p[k] - 2e-6f);
       beams_.high[k][run] = std::max(beams_.high[k][run], p[k] + 2e-6f);
@@ -252,20 +251,16 @@ void BeamSolver::Begin(std::size_t begin, std::size_t end) {
 /// May a triangle of its own leaf block the receiver? Most leaves are flat or bulge.
 bool BeamSolver::CanBlockOwn(std::size_t i, const BlockerTree::Leaf& leaf, const BlockerFit::Leaf& fit) const {
   const Tag d;
-  std::uint32_t below = 0, above = 0;  // certainly no sample's side
-  for (std::size_t j = 0; j < BlockerTree::kWidth; j += hn::Lanes(d)) {
-    const Vec3 to_corner = Subtract(
-        {hn::LoadU(d, leaf.corner[0][0] + j), hn::LoadU(d, leaf.corner[0][1] + j), hn::LoadU(d, leaf.corner[0][2] + j)},
-        Splat(Position(i)));
-    const Vec side =
-        Dot({hn::LoadU(d, leaf.normal[0] + j), hn::LoadU(d, leaf.normal[1] + j), hn::LoadU(d, leaf.normal[2] + j)},
-            to_corner);
-    const Vec error = hn::Mul(hn::LoadU(d, leaf.side_error + j), Norm1(to_corner));
-    above |= BitsAt(hn::Gt(side, error), j), below |= BitsAt(hn::Lt(side, hn::Neg(error)), j);
+  const vec3 r = Position(i);
+  struct {
+    std::uint32_t above = 0, below = 0, active = 0;
+  } view;
+  for (std::size_t j = 0; j < leaf.count; j += hn::Lanes(d)) {
+    const Vec3 corner{hn::LoadU(d, leaf.corner[0][0] + j), hn::LoadU(d, leaf.corner[0][1] + j),
+                      hn::LoadU(d, leaf.corner[0][2] + j)};
+    FindSides(leaf, fit, j, r, r, vec3(0.0f), Subtract(corner, Splat(r)), view);
   }
-  const std::uint32_t others = ((1u << leaf.count) - 1) & ~(1u << beams_.own[i] % BlockerTree::kWidth);
-  const std::uint32_t samples_below = SamplesBelow(fit, cluster_.low, cluster_.high);
-  return (((fit.samples_above & ~below) | (samples_below & ~above)) & others) != 0;
+  return (view.active & ~(1u << beams_.own[i] % BlockerTree::kWidth)) != 0;
 }
 
 /// Leaves that may lie between the cluster and the samples of the tile; false where there are none.

@@ -13,7 +13,6 @@
 namespace halfshade {
 namespace {
 
-constexpr std::size_t kCluster = BeamScratch::kReceivers;  // that share a list of groups
 constexpr std::size_t kClustersPerTask = 2;
 
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
@@ -100,7 +99,7 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const bool beams = kept.tiles.count != 0 && side.fit.alpha.empty();
   const ExactScene scene{blockers.tree, &side.fit, &samples,   beams ? &kept.tiles : nullptr,
                          &kept.rows,    cloud,     side.frame, work.beams};
-  constexpr std::size_t kPerTask = kCluster * kClustersPerTask, kTasksPerRound = 128;
+  constexpr std::size_t kPerTask = kClusterReceivers * kClustersPerTask, kTasksPerRound = 128;
   const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
   work.scratches.start(concurrency(), *blockers.tree, kept, beams);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
@@ -108,9 +107,9 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
       const ScratchLoan scratch(work.scratches);
       const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
-      for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kCluster) {
+      for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kClusterReceivers) {
         check_run();
-        solve_cluster(scene, begin, std::min(task_end, begin + kCluster), kernel, *scratch);
+        solve_cluster(scene, begin, std::min(task_end, begin + kClusterReceivers), kernel, *scratch);
       }
     });
   }
@@ -156,7 +155,8 @@ void ScratchPool::start(std::size_t threads, const BlockerTree& tree, const Exac
   free_.clear();
   for (const auto& s : scratches_) {
     s->stack.reserve(nodes), s->group.reserve(groups), s->keys.reserve(groups);
-    s->groups.reserve(nodes), s->gain.assign(nodes, 0.0f), s->own_places.reserve(kCluster), s->net_edges.reserve(edges);
+    s->groups.reserve(nodes), s->gain.assign(nodes, 0.0f), s->own_places.reserve(kClusterReceivers),
+        s->net_edges.reserve(edges);
     s->facing.reserve(facing), s->turning.reserve(turning);
     s->old_group.reserve(groups), s->old_bound.reserve(groups);
     for (int k = 0; k < 3; ++k) s->low[k].reserve(groups), s->high[k].reserve(groups);

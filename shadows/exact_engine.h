@@ -17,6 +17,8 @@
 
 namespace halfshade {
 
+inline constexpr std::size_t kClusterReceivers = BeamScratch::kReceivers;  // that share a list of groups
+
 /// What blocks, as the engine needs it.
 struct ExactBlockers {
   const LatticeMesh& mesh;

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "rasterizer/core/stopwatch.h"
+#include "shadows/exact_engine.h"
 #include "shadows/opaque_mesh.h"
 #include "shadows/solver.h"
 
@@ -157,7 +158,7 @@ std::vector<Shortcut> list_shortcuts(const LatticeMesh& scene_mesh, const Receiv
   all.push_back({"lit clusters",
                  stats.clusters_lit > 0,
                  stats.clusters_lit,
-                 (receivers.size() + 255) / 256,
+                 (receivers.size() + kClusterReceivers - 1) / kClusterReceivers,
                  "clusters",
                  {},
                  "no blocker's box in the shaft to the light; over all rounds with --max-error"});
