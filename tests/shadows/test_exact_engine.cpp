@@ -279,12 +279,17 @@ TEST_CASE("outlines of a bumpy surface give the oracle's bits for samples anywhe
     CAPTURE(seed);
     Random random(seed);
     const std::vector<Triangle> triangles = waves(random, static_cast<double>(seed), 0.0);
-    std::vector<Receiver> receivers;
+    std::vector<Receiver> receivers, below;
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       const auto& [a, b, c] = triangles[t];
       receivers.push_back({(a + b + c) / 3.0 + dvec3(0.0, t % 2 ? 1e-4 : -1e-4, 0.0), t});
     }
+    for (int i = 0; i < 1600; ++i) below.push_back({{0.1 * (i % 40) - 4.0, -4.0, 0.1 * (i / 40) - 1.0}, kNone});
     const Scene scene = scene_of(triangles);
+    Scene textured = scene;  // opaque everywhere as well, but textured triangles have no part in outlines
+    textured.alpha_maps = {{"opaque", 1, 1, {255}}}, textured.materials.resize(1), textured.materials[0].alpha_map = 0;
+    textured.triangle_materials.assign(triangles.size(), 0);
+    textured.triangle_uvs.assign(triangles.size(), {vec2(0, 0), vec2(1, 0), vec2(0, 1)});
     Light light = frame_light();
     light.center = {1.5, 2.5, -1.5}, light.normal = glm::cross(light.u, light.v), light.radius = 1.0;
     light.two_sided = true;
@@ -295,10 +300,13 @@ TEST_CASE("outlines of a bumpy surface give the oracle's bits for samples anywhe
         light.shape = shape;
         ShadowConfig config = frame_config(100);
         config.pattern = SamplePattern::kLowDiscrepancy, config.sample_sets = sets;
-        ShadowStats stats;
-        const VisibilityMasks masks = solve_exact_by(Beams::kNever, scene, receivers, light, config, &stats);
+        const VisibilityMasks masks = solve_exact_by(Beams::kNever, scene, receivers, light, config);
         CHECK(wrong_bits(masks, solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
-        CHECK(stats.pairs_sampled * 3 < stats.pairs_tested);  // not triangle by triangle
+        ShadowStats stats, one_by_one;
+        const VisibilityMasks truth = solve(scene, below, light, config, ShadowMethod::kOracle);
+        CHECK(wrong_bits(solve_exact_by(Beams::kNever, scene, below, light, config, &stats), truth) == 0);
+        CHECK(wrong_bits(solve_exact_by(Beams::kNever, textured, below, light, config, &one_by_one), truth) == 0);
+        CHECK(stats.pairs_sampled * 3 < one_by_one.pairs_sampled);
       }
     }
   }
