@@ -45,7 +45,7 @@ class BeamChoice {
     return static_cast<double>(c.receivers * c.samples) * std::pow(static_cast<double>(c.groups) + 4.0, 0.25);
   }
 
-  static constexpr double kLeastBeamMs = 9.2e-6;  // with vectors of 16 at 2.6 GHz; on others beams are tried more often
+  static constexpr double kLeastBeamMs = 7e-6;  // with vectors of 16 at 2.6 GHz; on others beams are tried more often
   double packet_ms_ = 0.0, beam_ms_ = kLeastBeamMs;
 };
 

@@ -161,32 +161,48 @@ class BeamSolver {
   /// Rounding of slopes, times 1 / z: coordinates are below 4.
   static constexpr float kPad = 4e-6f;
 
+  static constexpr std::size_t kSlopes = BeamScratch::kSlopes;
+
   /// Slopes between which a sample sees something.
   struct Slopes {
-    Vec low[2], high[2];
+    Vec low[kSlopes], high[kSlopes];
+  };
+  struct Window {
+    float low[kSlopes], high[kSlopes];
   };
 
   void Begin(std::size_t begin, std::size_t end);
   bool CanBlockOwn(std::size_t i, const BlockerTree::Leaf& leaf, const BlockerFit::Leaf& fit) const;
   bool ListLeaves(std::span<const vec3> tile);
-  void FindSlopes(const float* const low[3], const float* const high[3], std::size_t i, BeamScratch::Slopes& slopes);
+  void FindSlopes(std::size_t i);
   void Tighten(std::size_t at);
   void SolveSample(std::size_t i, const vec3& sample, std::uint32_t number);
-  void TestLeaf(std::size_t at, const vec3& sample, const float low[2], const float high[2], std::uint32_t runs);
+  std::uint32_t RunsBehind(std::size_t at, const Window& leaf) const;
+  void TestLeaf(std::size_t at, const vec3& sample, Window leaf);
   std::uint32_t TestRun(std::size_t run, std::uint32_t leaf, const vec3& sample, std::uint32_t asked);
   void StoreMasks();
 
-  /// The slopes from a sample off the tile's middle.
-  HWY_INLINE Slopes Shift(const BeamScratch::Slopes& slopes, std::size_t i) const {
+  /// The slopes of leaves from a sample off the tile's middle.
+  HWY_INLINE Slopes SeeLeaves(std::size_t i) const {
     const Tag d;
+    const BeamScratch::Slopes& slopes = beams_.leaf_slopes;
     const Vec near = hn::LoadU(d, slopes.near.data() + i), far = hn::LoadU(d, slopes.far.data() + i);
     Slopes s;
-    for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t k = 0; k < kSlopes; ++k) {
       const Vec a = hn::Mul(near, hn::Set(d, off_[k])), b = hn::Mul(far, hn::Set(d, off_[k]));
       s.low[k] = hn::Sub(hn::LoadU(d, slopes.low[k].data() + i), hn::Max(a, b));
       s.high[k] = hn::Sub(hn::LoadU(d, slopes.high[k].data() + i), hn::Min(a, b));
     }
     return s;
+  }
+  Window SeeLeaf(std::size_t at) const {
+    const BeamScratch::Slopes& slopes = beams_.leaf_slopes;
+    Window w;
+    for (std::size_t k = 0; k < kSlopes; ++k) {
+      const float near = slopes.near[at] * off_[k], far = slopes.far[at] * off_[k];
+      w.low[k] = slopes.low[k][at] - std::max(near, far), w.high[k] = slopes.high[k][at] - std::min(near, far);
+    }
+    return w;
   }
   vec3 Position(std::size_t i) const {
     return {receivers_.x[begin_ + i], receivers_.y[begin_ + i], receivers_.z[begin_ + i]};
@@ -204,10 +220,10 @@ class BeamSolver {
   BeamScratch& beams_;
   std::size_t begin_ = 0, count_ = 0;
   float middle_[2] = {}, off_plane_ = 0.0f;  // of the samples of the tile at work: where, at most how far
-  float pad_ = 0.0f;                         // of slopes of receivers
-  float off_[2] = {};                        // of the sample at work
+  float receiver_pad_ = 0.0f;                // of slopes of receivers
+  float off_[kSlopes] = {};                  // of the sample at work
   vec3 place_[kTile];                        // of the samples, light's frame
-  alignas(HWY_MAX_BYTES) float run_low_[2][kRuns], run_high_[2][kRuns];  // slopes from the sample at work
+  alignas(HWY_MAX_BYTES) float run_low_[kSlopes][kRuns], run_high_[kSlopes][kRuns];  // slopes from the sample at work
   std::uint16_t open_[kRuns];
   std::uint32_t open_runs_ = 0;
   SamplePlanes planes_;
@@ -226,6 +242,9 @@ void BeamSolver::Begin(std::size_t begin, std::size_t end) {
     const std::uint32_t own = receivers_.own[begin + at];
     beams_.height[i] = p.z, beams_.inverse[i] = 1.0f / p.z;
     beams_.x[i] = p.x * beams_.inverse[i], beams_.y[i] = p.y * beams_.inverse[i];
+    const std::size_t turned = i % kRun * kRuns + run;
+    beams_.x_by_run[turned] = beams_.x[i], beams_.y_by_run[turned] = beams_.y[i];
+    beams_.inverse_by_run[turned] = beams_.inverse[i];
     beams_.own[i] = own < place.size() ? place[own] : kNone;
     beams_.leaf_to_skip[i] = kNone;
     if (i >= count_) continue;
@@ -279,7 +298,7 @@ bool BeamSolver::ListLeaves(std::span<const vec3> tile) {
   const float pad = ProjectionPad(shaft.low[2]), inverse = 1.0f / shaft.low[2];
   shaft.light = {light.low_u - pad, light.low_v - pad, light.high_u + pad, light.high_v + pad};
   // A sample off the plane by dz sees slopes off by dz / z of themselves.
-  off_plane_ = off_plane, pad_ = inverse * (kPad + 8.0f * inverse * off_plane);
+  off_plane_ = off_plane, receiver_pad_ = inverse * (kPad + 8.0f * inverse * off_plane);
   beams_.clear_leaves();
   const float* const group_low[3] = {scratch_.low[0].data(), scratch_.low[1].data(), scratch_.low[2].data()};
   const float* const group_high[3] = {scratch_.high[0].data(), scratch_.high[1].data(), scratch_.high[2].data()};
@@ -300,28 +319,29 @@ bool BeamSolver::ListLeaves(std::span<const vec3> tile) {
   const std::size_t count = beams_.leaf.size();
   if (count == 0) return false;
   beams_.pad_leaves();
-  const float* const low[3] = {beams_.leaf_low[0].data(), beams_.leaf_low[1].data(), beams_.leaf_low[2].data()};
-  const float* const high[3] = {beams_.leaf_high[0].data(), beams_.leaf_high[1].data(), beams_.leaf_high[2].data()};
-  for (std::size_t i = 0; i < count; i += lanes) FindSlopes(low, high, i, beams_.leaf_slopes);
-  const float* const run_low[3] = {beams_.low[0], beams_.low[1], beams_.low[2]};
-  const float* const run_high[3] = {beams_.high[0], beams_.high[1], beams_.high[2]};
-  for (std::size_t i = 0; i < kRuns; i += lanes) FindSlopes(run_low, run_high, i, beams_.run_slopes);
+  for (std::size_t i = 0; i < count; i += lanes) FindSlopes(i);
   return true;
 }
 
-/// Boxes as the tile's middle sees them. What lies behind the light counts as just before it.
-void BeamSolver::FindSlopes(const float* const low[3], const float* const high[3], std::size_t i,
-                            BeamScratch::Slopes& slopes) {
+/// Leaves' boxes as the tile's middle sees them. What lies behind the light counts as just before it.
+void BeamSolver::FindSlopes(std::size_t i) {
   const Tag d;
+  BeamScratch::Slopes& slopes = beams_.leaf_slopes;
   const Vec one = hn::Set(d, 1.0f), tiny = hn::Set(d, 1e-9f);
-  const Vec near = hn::Div(one, hn::Max(hn::LoadU(d, low[2] + i), tiny)),
-            far = hn::Div(one, hn::Max(hn::LoadU(d, high[2] + i), tiny));
-  const Vec pad = hn::Mul(near, hn::MulAdd(near, hn::Set(d, 8.0f * off_plane_), hn::Set(d, kPad)));
+  const Vec near = hn::Div(one, hn::Max(hn::LoadU(d, beams_.leaf_low[2].data() + i), tiny)),
+            far = hn::Div(one, hn::Max(hn::LoadU(d, beams_.leaf_high[2].data() + i), tiny));
+  const Vec pad =
+      hn::MulAdd(near, hn::MulAdd(near, hn::Set(d, 8.0f * off_plane_), hn::Set(d, kPad)), hn::Set(d, receiver_pad_));
   for (std::size_t k = 0; k < 2; ++k) {
     const Vec middle = hn::Set(d, middle_[k]);
-    const Vec a = hn::Sub(hn::LoadU(d, low[k] + i), middle), b = hn::Sub(hn::LoadU(d, high[k] + i), middle);
+    const Vec a = hn::Sub(hn::LoadU(d, beams_.leaf_low[k].data() + i), middle),
+              b = hn::Sub(hn::LoadU(d, beams_.leaf_high[k].data() + i), middle);
     hn::StoreU(hn::Sub(hn::Min(hn::Mul(a, near), hn::Mul(a, far)), pad), d, slopes.low[k].data() + i);
     hn::StoreU(hn::Add(hn::Max(hn::Mul(b, near), hn::Mul(b, far)), pad), d, slopes.high[k].data() + i);
+  }
+  for (std::size_t k = 2; k < kSlopes; ++k) {  // not known before the leaf is tight
+    hn::StoreU(hn::Set(d, -1e30f), d, slopes.low[k].data() + i),
+        hn::StoreU(hn::Set(d, 1e30f), d, slopes.high[k].data() + i);
   }
   hn::StoreU(near, d, slopes.near.data() + i), hn::StoreU(far, d, slopes.far.data() + i);
 }
@@ -334,21 +354,25 @@ HWY_NOINLINE void BeamSolver::Tighten(std::size_t at) {
   const BlockerTree::Leaf& leaf = scene_.tree->leaves[beams_.leaf[at]];
   const Vec3 axes[2] = {Splat(vec3(scene_.frame.u)), Splat(vec3(scene_.frame.v))}, normal = Splat(vec3(scene_.frame.n));
   const Vec3 origin = Splat(vec3(scene_.frame.origin));
-  Vec low[2] = {hn::Set(d, 1e30f), hn::Set(d, 1e30f)}, high[2] = {hn::Set(d, -1e30f), hn::Set(d, -1e30f)};
+  Vec low[kSlopes], high[kSlopes];
+  for (std::size_t k = 0; k < kSlopes; ++k) low[k] = hn::Set(d, 1e30f), high[k] = hn::Set(d, -1e30f);
   for (std::size_t i = 0; i < BlockerTree::kWidth; i += hn::Lanes(d)) {
     for (const auto& corner : leaf.corner) {
       const Vec3 p =
           Subtract({hn::LoadU(d, corner[0] + i), hn::LoadU(d, corner[1] + i), hn::LoadU(d, corner[2] + i)}, origin);
       const Vec inverse = Reciprocal(Dot(p, normal));
-      for (std::size_t k = 0; k < 2; ++k) {
-        const Vec slope = hn::Mul(hn::Sub(Dot(p, axes[k]), hn::Set(d, middle_[k])), inverse);
-        low[k] = hn::Min(low[k], slope), high[k] = hn::Max(high[k], slope);
-      }
+      const Vec x = hn::Mul(hn::Sub(Dot(p, axes[0]), hn::Set(d, middle_[0])), inverse),
+                y = hn::Mul(hn::Sub(Dot(p, axes[1]), hn::Set(d, middle_[1])), inverse);
+      const Vec slope[kSlopes] = {x, y, hn::Add(x, y), hn::Sub(x, y)};
+      for (std::size_t k = 0; k < kSlopes; ++k)
+        low[k] = hn::Min(low[k], slope[k]), high[k] = hn::Max(high[k], slope[k]);
     }
   }
   BeamScratch::Slopes& slopes = beams_.leaf_slopes;
-  const float near = slopes.near[at], pad = near * (2.0f * kPad + 8.0f * near * off_plane_);
-  for (std::size_t k = 0; k < 2; ++k) {
+  const float near = slopes.near[at];
+  for (std::size_t k = 0; k < kSlopes; ++k) {
+    const float pad = (near * (2.0f * kPad + 8.0f * near * off_plane_) + receiver_pad_) *
+                      (k < 2 ? 1.0f : 2.0f);  // two slopes' errors
     slopes.low[k][at] = std::max(slopes.low[k][at], hn::GetLane(hn::MinOfLanes(d, low[k])) - pad);
     slopes.high[k][at] = std::min(slopes.high[k][at], hn::GetLane(hn::MaxOfLanes(d, high[k])) + pad);
   }
@@ -359,48 +383,53 @@ void BeamSolver::SolveSample(std::size_t i, const vec3& sample, std::uint32_t nu
   const Tag d;
   const std::size_t lanes = hn::Lanes(d), count = beams_.leaf.size();
   for (int k = 0; k < 2; ++k) off_[k] = place_[i][k] - middle_[k];
-  float low[2] = {1e30f, 1e30f}, high[2] = {-1e30f, -1e30f};  // of all receivers
+  off_[2] = off_[0] + off_[1], off_[3] = off_[0] - off_[1];
+  const Vec u = hn::Set(d, place_[i].x), v = hn::Set(d, place_[i].y);
+  float low[kSlopes], high[kSlopes];  // of all receivers
+  std::fill_n(low, kSlopes, 1e30f), std::fill_n(high, kSlopes, -1e30f);
   for (std::size_t j = 0; j < kRuns; j += lanes) {
-    const Slopes run = Shift(beams_.run_slopes, j);
-    for (std::size_t k = 0; k < 2; ++k) {
-      hn::Store(run.low[k], d, run_low_[k] + j), hn::Store(run.high[k], d, run_high_[k] + j);
-      low[k] = std::min(low[k], hn::GetLane(hn::MinOfLanes(d, run.low[k])));
-      high[k] = std::max(high[k], hn::GetLane(hn::MaxOfLanes(d, run.high[k])));
+    Slopes runs;
+    for (std::size_t k = 0; k < kSlopes; ++k) runs.low[k] = hn::Set(d, 1e30f), runs.high[k] = hn::Set(d, -1e30f);
+    for (std::size_t r = 0; r < kRun; ++r) {
+      const std::size_t at = r * kRuns + j;
+      const Vec inverse = hn::Load(d, beams_.inverse_by_run + at);
+      const Vec x = hn::NegMulAdd(inverse, u, hn::Load(d, beams_.x_by_run + at)),
+                y = hn::NegMulAdd(inverse, v, hn::Load(d, beams_.y_by_run + at));
+      const Vec slope[kSlopes] = {x, y, hn::Add(x, y), hn::Sub(x, y)};
+      for (std::size_t k = 0; k < kSlopes; ++k)
+        runs.low[k] = hn::Min(runs.low[k], slope[k]), runs.high[k] = hn::Max(runs.high[k], slope[k]);
+    }
+    for (std::size_t k = 0; k < kSlopes; ++k) {
+      hn::Store(runs.low[k], d, run_low_[k] + j), hn::Store(runs.high[k], d, run_high_[k] + j);
+      low[k] = std::min(low[k], hn::GetLane(hn::MinOfLanes(d, runs.low[k])));
+      high[k] = std::max(high[k], hn::GetLane(hn::MaxOfLanes(d, runs.high[k])));
     }
   }
   for (std::size_t j = 0; j < kMostReceivers; j += lanes) {
     const Vec inverse = hn::Load(d, beams_.inverse + j);
-    hn::Store(hn::NegMulAdd(inverse, hn::Set(d, place_[i].x), hn::Load(d, beams_.x + j)), d, beams_.slope[0] + j);
-    hn::Store(hn::NegMulAdd(inverse, hn::Set(d, place_[i].y), hn::Load(d, beams_.y + j)), d, beams_.slope[1] + j);
+    hn::Store(hn::NegMulAdd(inverse, u, hn::Load(d, beams_.x + j)), d, beams_.slope[0] + j);
+    hn::Store(hn::NegMulAdd(inverse, v, hn::Load(d, beams_.y + j)), d, beams_.slope[1] + j);
   }
   std::copy_n(beams_.valid, kRuns, open_);
   open_runs_ = (1u << (count_ + kRun - 1) / kRun) - 1;
   const Vec farthest = hn::Set(d, cluster_.shaft.high[2] + kPad);
   for (std::size_t j = 0; j < count && open_runs_ != 0; j += lanes) {
-    const Slopes leaves = Shift(beams_.leaf_slopes, j);
+    const Slopes leaves = SeeLeaves(j);
     LaneMask meets = hn::Lt(hn::LoadU(d, beams_.leaf_low[2].data() + j), farthest);
-    for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t k = 0; k < kSlopes; ++k) {
       meets = hn::And(meets,
                       hn::And(hn::Le(leaves.low[k], hn::Set(d, high[k])), hn::Ge(leaves.high[k], hn::Set(d, low[k]))));
     }
-    alignas(HWY_MAX_BYTES) float leaf_low[2][kMaxLanes], leaf_high[2][kMaxLanes];
-    for (std::size_t k = 0; k < 2; ++k)
+    std::uint64_t bits = Bits(meets);
+    if (bits == 0) continue;
+    alignas(HWY_MAX_BYTES) float leaf_low[kSlopes][kMaxLanes], leaf_high[kSlopes][kMaxLanes];
+    for (std::size_t k = 0; k < kSlopes; ++k)
       hn::Store(leaves.low[k], d, leaf_low[k]), hn::Store(leaves.high[k], d, leaf_high[k]);
-    for (std::uint64_t bits = Bits(meets); bits != 0; bits &= bits - 1) {
+    for (; bits != 0; bits &= bits - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(bits));
-      const float from[2] = {leaf_low[0][lane], leaf_low[1][lane]}, to[2] = {leaf_high[0][lane], leaf_high[1][lane]};
-      const Vec lowest = hn::Set(d, beams_.leaf_low[2][j + lane] - kPad);
-      std::uint32_t runs = 0;
-      for (std::size_t run = 0; run < kRuns; run += lanes) {
-        LaneMask overlap = hn::Gt(hn::Load(d, beams_.high[2] + run), lowest);
-        for (std::size_t k = 0; k < 2; ++k) {
-          overlap = hn::And(overlap, hn::And(hn::Le(hn::Load(d, run_low_[k] + run), hn::Set(d, to[k])),
-                                             hn::Ge(hn::Load(d, run_high_[k] + run), hn::Set(d, from[k]))));
-        }
-        runs |= BitsAt(overlap, run);
-      }
-      runs &= open_runs_;
-      if (runs != 0) TestLeaf(j + lane, sample, from, to, runs);
+      Window leaf;
+      for (std::size_t k = 0; k < kSlopes; ++k) leaf.low[k] = leaf_low[k][lane], leaf.high[k] = leaf_high[k][lane];
+      TestLeaf(j + lane, sample, leaf);
     }
   }
   std::uint16_t* const blocked = beams_.blocked.data() + number * kRuns;
@@ -408,19 +437,31 @@ void BeamSolver::SolveSample(std::size_t i, const vec3& sample, std::uint32_t nu
     blocked[run] = static_cast<std::uint16_t>(beams_.valid[run] & ~open_[run]);
 }
 
-/// A leaf that the sample sees between slopes `low` and `high`, against the runs of receivers that it may overlap.
-HWY_INLINE void BeamSolver::TestLeaf(std::size_t at, const vec3& sample, const float low[2], const float high[2],
-                                     std::uint32_t runs) {
+/// The runs that hold receivers which are open and may lie behind a leaf.
+HWY_INLINE std::uint32_t BeamSolver::RunsBehind(std::size_t at, const Window& leaf) const {
+  const Tag d;
+  const Vec lowest = hn::Set(d, beams_.leaf_low[2][at] - kPad);
+  std::uint32_t runs = 0;
+  for (std::size_t run = 0; run < kRuns; run += hn::Lanes(d)) {
+    LaneMask overlap = hn::Gt(hn::Load(d, beams_.high[2] + run), lowest);
+    for (std::size_t k = 0; k < kSlopes; ++k) {
+      overlap = hn::And(overlap, hn::And(hn::Le(hn::Load(d, run_low_[k] + run), hn::Set(d, leaf.high[k])),
+                                         hn::Ge(hn::Load(d, run_high_[k] + run), hn::Set(d, leaf.low[k]))));
+    }
+    runs |= BitsAt(overlap, run);
+  }
+  return runs & open_runs_;
+}
+
+/// A leaf against all receivers that may lie behind it.
+HWY_INLINE void BeamSolver::TestLeaf(std::size_t at, const vec3& sample, Window leaf) {
   const Tag d;
   const UintTag du;
-  float from[2] = {low[0] - pad_, low[1] - pad_}, to[2] = {high[0] + pad_, high[1] + pad_};
-  if (!beams_.is_tight[at]) {
+  std::uint32_t runs = RunsBehind(at, leaf);
+  if (runs != 0 && !beams_.is_tight[at]) {
     Tighten(at);
-    const BeamScratch::Slopes& slopes = beams_.leaf_slopes;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const float near = slopes.near[at] * off_[k], far = slopes.far[at] * off_[k];
-      from[k] = slopes.low[k][at] - std::max(near, far) - pad_, to[k] = slopes.high[k][at] - std::min(near, far) + pad_;
-    }
+    leaf = SeeLeaf(at);
+    runs = RunsBehind(at, leaf);
   }
   const std::uint32_t index = beams_.leaf[at];
   const Vec lowest = hn::Set(d, beams_.leaf_low[2][at] - kPad);
@@ -431,9 +472,11 @@ HWY_INLINE void BeamSolver::TestLeaf(std::size_t at, const vec3& sample, const f
     for (std::size_t i = 0; i < kRun; i += hn::Lanes(d)) {
       const std::size_t r = run * kRun + i;
       LaneMask within = hn::Gt(hn::Load(d, beams_.height + r), lowest);
-      for (std::size_t k = 0; k < 2; ++k) {
-        const Vec slope = hn::Load(d, beams_.slope[k] + r);
-        within = hn::And(within, hn::And(hn::Le(slope, hn::Set(d, to[k])), hn::Ge(slope, hn::Set(d, from[k]))));
+      const Vec x = hn::Load(d, beams_.slope[0] + r), y = hn::Load(d, beams_.slope[1] + r);
+      const Vec slope[kSlopes] = {x, y, hn::Add(x, y), hn::Sub(x, y)};
+      for (std::size_t k = 0; k < kSlopes; ++k) {
+        within = hn::And(
+            within, hn::And(hn::Le(slope[k], hn::Set(d, leaf.high[k])), hn::Ge(slope[k], hn::Set(d, leaf.low[k]))));
       }
       const auto other = hn::Ne(hn::Load(du, beams_.leaf_to_skip + r), hn::Set(du, index));
       asked |= BitsAt(hn::And(within, hn::RebindMask(d, other)), i);

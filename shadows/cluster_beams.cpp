@@ -4,12 +4,12 @@
 namespace halfshade {
 
 void BeamScratch::Slopes::resize(std::size_t count) {
-  for (int k = 0; k < 2; ++k) low[k].resize(count), high[k].resize(count);
+  for (std::size_t k = 0; k < kSlopes; ++k) low[k].resize(count), high[k].resize(count);
   near.resize(count), far.resize(count);
 }
 
 void BeamScratch::Slopes::reserve(std::size_t count) {
-  for (int k = 0; k < 2; ++k) low[k].reserve(count), high[k].reserve(count);
+  for (std::size_t k = 0; k < kSlopes; ++k) low[k].reserve(count), high[k].reserve(count);
   near.reserve(count), far.reserve(count);
 }
 

@@ -89,27 +89,29 @@ struct TurningTriangle {
 struct BeamScratch {
   static constexpr std::size_t kRuns = 16, kReceivers = 16 * kRuns;
 
-  /// Slopes x / z, y / z of boxes from the middle of some samples, and 1 / z of where they are nearest and farthest.
+  /// x / z, y / z, (x + y) / z and (x - y) / z: slopes between which a leaf is seen from the middle of some samples,
+  /// and 1 / z of where it is nearest and farthest.
+  static constexpr std::size_t kSlopes = 4;
   struct Slopes {
-    std::vector<float> low[2], high[2], near, far;
+    std::vector<float> low[kSlopes], high[kSlopes], near, far;
     void resize(std::size_t count);
     void reserve(std::size_t count);
   };
   // Of the receivers, light's frame: x / z, y / z, z and 1 / z; slopes from the sample at work.
   alignas(64) float x[kReceivers], y[kReceivers], height[kReceivers], inverse[kReceivers], slope[2][kReceivers];
+  alignas(64) float x_by_run[kReceivers], y_by_run[kReceivers], inverse_by_run[kReceivers];  // [receiver of a run][run]
   alignas(64) std::uint32_t own[kReceivers],
       leaf_to_skip[kReceivers];                     // BlockerTree::place; a leaf that cannot block it
   alignas(64) float low[3][kRuns], high[3][kRuns];  // boxes of the runs, light's frame
   vec3 box_low[kRuns], box_high[kRuns];             // lattice
   std::uint16_t valid[kRuns];                       // bits of receivers
-  Slopes run_slopes, leaf_slopes;
+  Slopes leaf_slopes;
   // Leaves that the samples at work may see before the cluster, their boxes, and whether their slopes are of corners.
   std::vector<std::uint32_t> leaf;
   std::vector<float> leaf_low[3], leaf_high[3];
   std::vector<std::uint8_t> is_tight;
   std::vector<std::uint16_t> blocked;  // [sample][run]: bits of receivers
 
-  BeamScratch() { run_slopes.resize(kRuns); }
   void reserve(std::size_t leaves, std::size_t samples);
   void clear_leaves();
   void add_leaf(const BlockerTree::Node& group, std::size_t child);
