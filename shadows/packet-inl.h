@@ -45,6 +45,7 @@ struct ReceiverBox {
 
 /// Receivers [first, first + count), a lane each; lanes beyond repeat the last one and have nothing open.
 struct Packet : ReceiverBox {
+  const KernelReceivers* receivers = nullptr;
   std::size_t first = 0, count = 0;
   const std::uint8_t* set = nullptr;  // of each receiver
   bool has_one_set = true;
@@ -58,6 +59,21 @@ struct Packet : ReceiverBox {
   float open_low[2], open_high[2];    // columns and rows from the centre between which lies what some receiver has open
   std::uint32_t any_open[kMaxLines];  // what some receiver has open
   alignas(HWY_MAX_BYTES) std::uint32_t open[kMaxLines][kMaxLanes];  // bit i: sample i of the line is not blocked yet
+
+  vec3 at(std::size_t lane) const {
+    return {receivers->x[first + lane], receivers->y[first + lane], receivers->z[first + lane]};
+  }
+};
+
+/// The samples of a line that a packet's receiver is asked for, by bit.
+struct LinePoints {
+  LinePoints(const SampleRows& rows, const Packet& packet, std::size_t lane, std::uint32_t line)
+      : x(rows.line_points(rows.point_x, packet.set[lane], line)),
+        y(rows.line_points(rows.point_y, packet.set[lane], line)),
+        z(rows.line_points(rows.point_z, packet.set[lane], line)) {}
+  vec3 operator[](std::size_t bit) const { return {x[bit], y[bit], z[bit]}; }
+
+  const float *x, *y, *z;
 };
 
 /// Rectangles as whole rows and columns of the picture, a lane each; none where first > last.

@@ -3,17 +3,15 @@
 // go to the exact predicate.
 //
 // What is decided once for the whole packet: which leaves, which of a leaf's triangles (16 at a time), which rows.
-#include <optional>
-
-#include "rasterizer/core/stopwatch.h"
 #include "shadows/packet_kernel.h"
+#include "rasterizer/core/stopwatch.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "shadows/packet_kernel.cpp"
 #include <hwy/foreach_target.h>
 
 #include "shadows/cluster_beams-inl.h"
-#include "shadows/packet_texels-inl.h"
+#include "shadows/packet_singles-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace halfshade {
@@ -29,7 +27,8 @@ class PacketSolver {
         receivers_(receivers),
         scratch_(scratch),
         counters_(scratch.counters),
-        outline_(scene, packet_, scratch) {}
+        outline_(scene, packet_, scratch),
+        singles_(scene, packet_, changed_lines_, counters_) {}
 
   HWY_INLINE void Solve(std::size_t first, std::size_t count) {
     if (!Begin(first, count)) return;
@@ -66,38 +65,9 @@ class PacketSolver {
   void SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves, std::uint32_t line,
                    const std::uint32_t* doubtful, std::uint32_t* blocked);
   const LeafView& ViewLeaf(const BlockerTree::Node& group, std::uint32_t k);
-  bool RasterizeLeaf(std::size_t leaf, const LeafView& view, std::uint32_t wanted);
-  bool RasterizeTriangle(std::size_t leaf, const LeafView& view, std::size_t lane);
   void StoreMasks();
 
   HWY_NOINLINE UintVec WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const;
-  HWY_NOINLINE UintVec TestSamples(const TriangleAnywhere& triangle, const PictureRange& range, std::uint32_t line,
-                                   UintVec& inside) const;
-  HWY_INLINE void SetPlanes(PacketTriangle& triangle) const;
-  HWY_INLINE LaneMask FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range,
-                                const LineSet& lines);
-  HWY_INLINE bool Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
-                            LaneMask below, LaneMask active);
-  HWY_INLINE std::array<LaneMask, 4> Orient(const PacketTriangle& triangle, LaneMask below) const;
-  UintVec Settle(const PacketTriangle& triangle, const PictureRange& range, std::uint32_t line, UintVec possible,
-                 UintVec inside);
-  UintVec OpaqueOf(const AlphaTriangle& alpha, const PictureRange& range, std::uint32_t line, UintVec inside);
-
-  vec3 Position(std::size_t lane) const {
-    const std::size_t i = packet_.first + lane;
-    return {receivers_.x[i], receivers_.y[i], receivers_.z[i]};
-  }
-
-  /// The samples of a line that a receiver is asked for, by bit.
-  struct LinePoints {
-    const float *x, *y, *z;
-    vec3 operator[](std::size_t bit) const { return {x[bit], y[bit], z[bit]}; }
-  };
-  LinePoints PointsOf(std::size_t lane, std::uint32_t line) const {
-    return {rows_.line_points(rows_.point_x, packet_.set[lane], line),
-            rows_.line_points(rows_.point_y, packet_.set[lane], line),
-            rows_.line_points(rows_.point_z, packet_.set[lane], line)};
-  }
 
   const ExactScene& scene_;
   const SampleRows& rows_;
@@ -107,29 +77,24 @@ class PacketSolver {
   KernelCounters& counters_;
   Packet packet_;
   LineSet changed_lines_;
-  float gain_ = 0.0f;                         // of the group at work
-  PictureRanges leaf_ranges_;                 // of the group at work
-  LeafView views_[BlockerTree::kWidth];       // of its leaves
-  std::uint32_t viewed_ = 0;                  // those that are there
-  GroupOutline outline_;                      // of the patch at work
-  ProjectedVertices vertices_;                // of the leaf at work
-  const AlphaTriangle* texels_of_ = nullptr;  // the perforated triangle that these belong to:
-  PacketTexels texels_;                       // where `has_texels_`
-  bool has_texels_ = false;
-  std::optional<TexelLookup> lookups_[kMaxLanes];  // made when first needed
+  float gain_ = 0.0f;                    // of the group at work
+  PictureRanges leaf_ranges_;            // of the group at work
+  LeafView views_[BlockerTree::kWidth];  // of its leaves
+  std::uint32_t viewed_ = 0;             // those that are there
+  GroupOutline outline_;                 // of the patch at work
+  SingleTriangles singles_;
 };
 
 /// Positions, boxes and pictures; all samples are open.
 bool PacketSolver::Begin(std::size_t first, std::size_t count) {
   const Tag d;
   const UintTag du;
-  packet_.first = first, packet_.count = count;
+  packet_.receivers = &receivers_, packet_.first = first, packet_.count = count;
   packet_.set = receivers_.set.data() + first;
   packet_.has_one_set =
       std::all_of(packet_.set, packet_.set + count, [&](std::uint8_t s) { return s == packet_.set[0]; });
-  texels_of_ = nullptr;
   static_cast<ReceiverBox&>(packet_) = ReceiverBox();
-  for (std::size_t i = 0; i < count; ++i) packet_.add(scene_.frame, Position(i));
+  for (std::size_t i = 0; i < count; ++i) packet_.add(scene_.frame, packet_.at(i));
   packet_.position = {hn::LoadU(d, &receivers_.x[first]), hn::LoadU(d, &receivers_.y[first]),
                       hn::LoadU(d, &receivers_.z[first])};
   packet_.own = hn::LoadU(du, &receivers_.own[first]);
@@ -148,6 +113,7 @@ bool PacketSolver::Begin(std::size_t first, std::size_t count) {
               du, packet_.open[line]);
   for (std::uint64_t& word : changed_lines_.bits) word = ~std::uint64_t{0};
   outline_.Begin();
+  singles_.Begin();
   return FindOpenPart();
 }
 
@@ -226,7 +192,7 @@ bool PacketSolver::RasterizeGroup(const BlockerTree::Node& group, GroupView& vie
     if (wanted == 0) continue;
     const std::uint32_t leaf = group.first_leaf() + k;
     counters_.pairs_tested += scene_.tree->leaves[leaf].count * packet_.count;
-    added |= RasterizeLeaf(leaf, ViewLeaf(group, k), wanted);
+    added |= singles_.Rasterize(leaf, ViewLeaf(group, k), wanted);
   }
   return added;
 }
@@ -262,27 +228,6 @@ const LeafView& PacketSolver::ViewLeaf(const BlockerTree::Node& group, std::uint
   return view;
 }
 
-/// The triangles of `wanted`, one by one; true where samples were blocked.
-bool PacketSolver::RasterizeLeaf(std::size_t index, const LeafView& view, std::uint32_t wanted) {
-  const BlockerTree::Leaf& leaf = scene_.tree->leaves[index];
-  const std::uint32_t kept = view.kept & wanted;
-  if (kept == 0) return false;
-  std::uint64_t vertices = 0;
-  for (std::uint32_t rest = kept & view.bounded; rest != 0; rest &= rest - 1) {
-    const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-    for (const auto& vertex : leaf.corner_vertex) vertices |= std::uint64_t{1} << vertex[lane];
-  }
-  const VertexProjection projection(scene_, packet_);
-  for (; vertices != 0; vertices &= vertices - 1) {
-    const auto v = static_cast<std::size_t>(std::countr_zero(vertices));
-    projection.Project({leaf.vertex[0][v], leaf.vertex[1][v], leaf.vertex[2][v]}, v, vertices_);
-  }
-  bool added = false;
-  for (std::uint32_t rest = kept; rest != 0; rest &= rest - 1)
-    added |= RasterizeTriangle(index, view, static_cast<std::size_t>(std::countr_zero(rest)));
-  return added;
-}
-
 /// Doubtful samples of a line by the exact predicate: does a triangle of the patch block them?
 void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16_t* patch, std::uint32_t leaves,
                                std::uint32_t line, const std::uint32_t* doubtful, std::uint32_t* blocked) {
@@ -293,7 +238,7 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
   };
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
     if (doubtful[lane] == 0) continue;
-    const LinePoints points = PointsOf(lane, line);
+    const LinePoints points(rows_, packet_, lane, line);
     for (std::uint32_t rest = doubtful[lane]; rest != 0; rest &= rest - 1) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(rest));
       const auto column = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord + bit);
@@ -308,7 +253,7 @@ void PacketSolver::SettlePatch(const BlockerTree::Node& group, const std::uint16
           if (!within(seen.ranges, i, column)) continue;
           ++counters_.exact_fallbacks;
           is_blocked =
-              blocks(leaf.corner_at(0, i), leaf.corner_at(1, i), leaf.corner_at(2, i), Position(lane), points[bit]);
+              blocks(leaf.corner_at(0, i), leaf.corner_at(1, i), leaf.corner_at(2, i), packet_.at(lane), points[bit]);
         }
       }
       blocked[lane] |= std::uint32_t{is_blocked} << bit;
@@ -372,232 +317,6 @@ bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupVie
   });
   counters_.pairs_necessary += any;
   added |= any;
-  return true;
-}
-
-/// The planes through receivers and edges, and the triangle's own where it cuts the light.
-HWY_INLINE void PacketSolver::SetPlanes(PacketTriangle& triangle) const {
-  const Tag d;
-  const Vec3 axis_x = Splat(rows_.axis_x), axis_y = Splat(rows_.axis_y);
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::size_t next = (k + 1) % 3;
-    const vec3 edge = triangle.corner[next] - triangle.corner[k];
-    const float edge_norm = std::fabs(edge.x) + std::fabs(edge.y) + std::fabs(edge.z);
-    const Vec3 to_corner = Subtract(Splat(triangle.corner[k]), packet_.position);
-    const Vec3 m = Cross(to_corner, Splat(edge));
-    const Vec error = hn::Mul(hn::Mul(hn::Set(d, kDeterminantError * edge_norm), Norm1(to_corner)), packet_.distance);
-    triangle.planes[k] = SolveForX(rows_, Dot(m, axis_x), Dot(m, axis_y), Dot(m, packet_.to_center), error);
-  }
-  triangle.count = 3;
-  if (!triangle.samples_above || !triangle.samples_below) return;
-  if (scene_.cloud != nullptr) {
-    // Above all samples it hides what lies behind it.
-    const auto is_above = [&](const vec3& p) {
-      return scene_.frame.to_frame(dvec3(p)).z > double{scene_.cloud->high.z};
-    };
-    triangle.cuts_cloud = !std::all_of(triangle.corner.begin(), triangle.corner.end(), is_above);
-    return;
-  }
-  const BlockerPlane& plane = triangle.plane;
-  const SampleSides sides = sides_of_samples(plane, triangle.corner[0], *scene_.samples);
-  const float error = sides.plane_error + plane.side_error * (rows_.deviation / kDeterminantError);
-  triangle.planes[3] =
-      SolveForX(rows_, hn::Set(d, glm::dot(plane.normal, rows_.axis_x)),
-                hn::Set(d, glm::dot(plane.normal, rows_.axis_y)), hn::Set(d, sides.plane_at_center), hn::Set(d, error));
-  triangle.count = 4;
-}
-
-/// Half planes turned to where the receiver sees the triangle from.
-HWY_INLINE std::array<LaneMask, 4> PacketSolver::Orient(const PacketTriangle& triangle, LaneMask below) const {
-  std::array<LaneMask, 4> up;
-  for (std::size_t k = 0; k < 4; ++k) up[k] = hn::Xor(triangle.planes[k < triangle.count ? k : 0].up, below);
-  return up;
-}
-
-/// Of a line's samples that are in the range and open to somebody, those that may be inside the triangle, and those
-/// that certainly are.
-UintVec PacketSolver::TestSamples(const TriangleAnywhere& triangle, const PictureRange& range, std::uint32_t line,
-                                  UintVec& inside) const {
-  const UintTag du;
-  UintVec possible = hn::Zero(du);
-  inside = possible;
-  const auto from = static_cast<std::int32_t>(line / rows_.rows * SampleRows::kWord);
-  for (std::uint32_t asked = range.bits(from) & packet_.any_open[line]; asked != 0; asked &= asked - 1) {
-    const auto i = static_cast<std::size_t>(std::countr_zero(asked));
-    const UintVec bit = hn::Set(du, 1u << i);
-    LaneMask may, is;
-    triangle.Test(SamplePlace(*packet_.places, line * SampleRows::kWord + i), may, is);
-    possible = hn::Or(possible, hn::IfThenElseZero(hn::RebindMask(du, may), bit));
-    inside = hn::Or(inside, hn::IfThenElseZero(hn::RebindMask(du, is), bit));
-  }
-  return possible;
-}
-
-/// The lanes whose receiver lies above the plane, along the normal ("the plane is below it"). Takes those for which the
-/// triangle hides nothing out of `active`.
-HWY_INLINE LaneMask PacketSolver::FindBelow(const PacketTriangle& triangle, LaneMask& active, const PictureRange& range,
-                                            const LineSet& lines) {
-  const Tag d;
-  const BlockerPlane& plane = triangle.plane;
-  const Vec3 to_corner = Subtract(Splat(triangle.corner[0]), packet_.position);
-  const Vec side = Dot(Splat(plane.normal), to_corner), error = hn::Mul(hn::Set(d, plane.side_error), Norm1(to_corner));
-  LaneMask below = hn::Lt(side, hn::Neg(error));
-  const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
-  LaneMask wanted = hn::Or(triangle.samples_above ? hn::Gt(side, error) : none, triangle.samples_below ? below : none);
-  const LaneMask unknown = hn::And(active, hn::Le(hn::Abs(side), error));
-  if (!hn::AllFalse(d, unknown)) {
-    // Only the exact predicate can tell; it is asked for receivers that would lose something one way or the other.
-    LaneMask matters = none;
-    for (const LaneMask turned : {none, hn::Not(none)}) {
-      const std::array<LaneMask, 4> up = Orient(triangle, turned);
-      const Outline outline(triangle, up, Bits(unknown));
-      std::optional<TriangleAnywhere> anywhere;
-      if (rows_.anywhere) anywhere.emplace(rows_, triangle, up);
-      lines.for_each([&](std::uint32_t line) HWY_ATTR {
-        const UintTag du;
-        const PictureLines& l = *packet_.lines;
-        UintVec inside;
-        const UintVec possible = hn::And(
-            rows_.anywhere
-                ? TestSamples(*anywhere, range, line, inside)
-                : outline.possible(hn::Load(d, l.y[line]), hn::Load(d, l.offset[line]), hn::Load(d, l.rest[line])),
-            hn::Load(du, packet_.open[line]));
-        matters = hn::Or(matters, hn::RebindMask(d, hn::Ne(possible, hn::Zero(du))));
-      });
-    }
-    for (std::uint64_t rest = Bits(hn::And(unknown, matters)); rest != 0; rest &= rest - 1) {
-      const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
-      ++counters_.exact_fallbacks;
-      const int sign = orient3d(triangle.corner[0], triangle.corner[1], triangle.corner[2], Position(lane));
-      if (sign == 0 || !(sign < 0 ? triangle.samples_below : triangle.samples_above)) continue;
-      const LaneMask this_lane = LanesFromBits(1u << lane, 0);
-      wanted = hn::Or(wanted, this_lane);
-      if (sign < 0) below = hn::Or(below, this_lane);
-    }
-  }
-  active = hn::And(active, wanted);
-  return below;
-}
-
-/// The samples of a line that the triangle blocks, of those that it may block and those that it certainly meets.
-UintVec PacketSolver::Settle(const PacketTriangle& triangle, const PictureRange& range, std::uint32_t line,
-                             UintVec possible, UintVec inside) {
-  const UintTag du;
-  const UintVec doubtful = hn::AndNot(inside, possible);
-  if (!hn::AllTrue(du, hn::Eq(doubtful, hn::Zero(du)))) {
-    const auto& [a, b, c] = triangle.corner;
-    alignas(HWY_MAX_BYTES) std::uint32_t in_doubt[kMaxLanes], does[kMaxLanes];
-    hn::Store(doubtful, du, in_doubt), hn::Store(inside, du, does);
-    for (std::size_t lane = 0; lane < packet_.count; ++lane) {
-      if (in_doubt[lane] == 0) continue;
-      const LinePoints points = PointsOf(lane, line);
-      for (std::uint32_t rest = in_doubt[lane]; rest != 0; rest &= rest - 1) {
-        const auto bit = static_cast<std::size_t>(std::countr_zero(rest));
-        ++counters_.exact_fallbacks;
-        does[lane] |= std::uint32_t{blocks(a, b, c, Position(lane), points[bit])} << bit;
-      }
-    }
-    inside = hn::Load(du, does);
-  }
-  const bool none = hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)));
-  return triangle.alpha == nullptr || none ? inside : OpaqueOf(*triangle.alpha, range, line, inside);
-}
-
-/// Of a line's samples, all blocked by the triangle, those that meet an opaque texel of it.
-UintVec PacketSolver::OpaqueOf(const AlphaTriangle& alpha, const PictureRange& range, std::uint32_t line,
-                               UintVec inside) {
-  const UintTag du;
-  if (texels_of_ != &alpha) {
-    texels_of_ = &alpha;
-    has_texels_ = texels_.Set(scene_, packet_, alpha, range);
-    std::fill(std::begin(lookups_), std::end(lookups_), std::nullopt);
-  }
-  UintVec opaque = hn::Zero(du), open = inside;
-  if (has_texels_) opaque = texels_.Opaque(line, inside, open);
-  if (hn::AllTrue(du, hn::Eq(open, hn::Zero(du)))) return opaque;
-  alignas(HWY_MAX_BYTES) std::uint32_t asked[kMaxLanes], is[kMaxLanes];
-  hn::Store(open, du, asked), hn::Store(opaque, du, is);
-  for (std::size_t lane = 0; lane < packet_.count; ++lane) {
-    if (asked[lane] == 0) continue;
-    const LinePoints points = PointsOf(lane, line);
-    if (!lookups_[lane]) lookups_[lane].emplace(alpha, Position(lane));
-    is[lane] |= OpaqueSamples(alpha, *lookups_[lane], Position(lane), points.x, points.y, points.z, asked[lane],
-                              counters_.exact_fallbacks);
-  }
-  return hn::Load(du, is);
-}
-
-HWY_INLINE bool PacketSolver::Rasterize(const PacketTriangle& triangle, const PictureRange& range, const LineSet& lines,
-                                        LaneMask below, LaneMask active) {
-  const Tag d;
-  const UintTag du;
-  const std::array<LaneMask, 4> up = Orient(triangle, below);
-  const Outline outline(triangle, up, Bits(active));
-  std::optional<TriangleAnywhere> anywhere;
-  if (rows_.anywhere) anywhere.emplace(rows_, triangle, up);
-  const auto wanted = hn::VecFromMask(du, hn::RebindMask(du, active));
-  bool added = false;
-  lines.for_each([&](std::uint32_t line) HWY_ATTR {
-    const PictureLines& l = *packet_.lines;
-    const Vec y = hn::Load(d, l.y[line]), offset = hn::Load(d, l.offset[line]), rest = hn::Load(d, l.rest[line]);
-    const UintVec open = hn::Load(du, packet_.open[line]), asked = hn::And(open, wanted);
-    UintVec inside;
-    const UintVec possible = hn::And(
-        asked, rows_.anywhere ? TestSamples(*anywhere, range, line, inside) : outline.possible(y, offset, rest));
-    ++counters_.sample_tests;
-    if (hn::AllTrue(du, hn::Eq(possible, hn::Zero(du)))) return;
-    inside = hn::And(asked, rows_.anywhere ? inside : outline.inside(y, offset, rest));
-    if (triangle.cuts_cloud) inside = hn::Zero(du);
-    if (triangle.alpha != nullptr || !hn::AllTrue(du, hn::Eq(possible, inside))) {
-      inside = Settle(triangle, range, line, possible, inside);
-      if (hn::AllTrue(du, hn::Eq(inside, hn::Zero(du)))) return;
-    }
-    hn::Store(hn::AndNot(inside, open), du, packet_.open[line]);
-    changed_lines_.add(line);
-    added = true;
-  });
-  return added;
-}
-
-/// One triangle into all pictures; true where samples were blocked.
-bool PacketSolver::RasterizeTriangle(std::size_t index, const LeafView& view, std::size_t lane) {
-  const Tag d;
-  const UintTag du;
-  const BlockerTree::Leaf& leaf = scene_.tree->leaves[index];
-  const BlockerFit::Leaf& fit = scene_.fit->leaves[index];
-  const PictureRange range(rows_, view.ranges, lane);
-  LaneMask active =
-      hn::And(hn::FirstN(d, packet_.count), hn::RebindMask(d, hn::Ne(packet_.own, hn::Set(du, leaf.triangle[lane]))));
-  LineSet lines;
-  if ((view.bounded >> lane) & 1) {
-    const std::array<std::uint8_t, 3> corner = {leaf.corner_vertex[0][lane], leaf.corner_vertex[1][lane],
-                                                leaf.corner_vertex[2][lane]};
-    active = hn::And(active, ReceiversOverOpenSamples(rows_, corner, view.pad[lane], vertices_, range, packet_, lines));
-  } else {
-    active = hn::And(active, ReceiversBelow(rows_, scene_.frame, leaf, lane, packet_));
-    if (hn::AllFalse(d, active)) return false;
-    range.for_open_lines(rows_, packet_, [&](std::uint32_t line, std::uint32_t) {
-      lines.add(line);
-      return false;
-    });
-  }
-  if (hn::AllFalse(d, active)) return false;
-  PacketTriangle triangle;
-  triangle.alpha = (leaf.perforated >> lane & 1) != 0 ? &scene_.fit->alpha_of(*scene_.tree, index, lane) : nullptr;
-  for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = leaf.corner_at(k, lane);
-  triangle.plane = leaf.plane_at(lane);
-  triangle.samples_above = fit.samples_above >> lane & 1, triangle.samples_below = fit.samples_below >> lane & 1;
-  SetPlanes(triangle);
-  const bool above = (view.above >> lane) & 1, below = (view.below >> lane) & 1;
-  const LaneMask none = hn::Lt(hn::Set(d, 0.0f), hn::Zero(d));
-  LaneMask is_below = below ? hn::Not(none) : none;
-  if (!above && !below) {
-    is_below = FindBelow(triangle, active, range, lines);
-    if (hn::AllFalse(d, active)) return false;
-  }
-  ++counters_.pairs_sampled;
-  if (!Rasterize(triangle, range, lines, is_below, active)) return false;
-  ++counters_.pairs_necessary;
   return true;
 }
 
