@@ -232,8 +232,7 @@ class BeamSolver {
 void BeamSolver::Begin(std::size_t begin, std::size_t end) {
   begin_ = begin, count_ = end - begin;
   const std::vector<std::uint32_t>& place = scene_.tree->place;
-  for (auto& axis : beams_.low) std::fill_n(axis, kRuns, 1e30f);
-  for (auto& axis : beams_.high) std::fill_n(axis, kRuns, -1e30f);
+  std::fill_n(beams_.farthest, kRuns, -1e30f);
   std::fill_n(beams_.box_low, kRuns, vec3(1e30f)), std::fill_n(beams_.box_high, kRuns, vec3(-1e30f));
   std::fill_n(beams_.valid, kRuns, std::uint16_t{0});
   for (std::size_t i = 0; i < kMostReceivers; ++i) {
@@ -253,16 +252,8 @@ void BeamSolver::Begin(std::size_t begin, std::size_t end) {
       if (!CanBlockOwn(i, scene_.tree->leaves[leaf], scene_.fit->leaves[leaf])) beams_.leaf_to_skip[i] = leaf;
     }
     beams_.box_low[run] = glm::min(beams_.box_low[run], r), beams_.box_high[run] = glm::max(beams_.box_high[run], r);
-    for (int k = 0; k < 3; ++k) {
-      beams_.low[k][run] = std::min(beams_.low[k][run], p[k] - 2e-6f);
-      beams_.high[k][run] = std::max(beams_.high[k][run], p[k] + 2e-6f);
-    }
+    beams_.farthest[run] = std::max(beams_.farthest[run], p.z + 2e-6f);
     beams_.valid[run] |= static_cast<std::uint16_t>(1u << i % kRun);
-  }
-  for (int k = 0; k < 3; ++k) {  // runs that are not there
-    const std::size_t runs = (count_ + kRun - 1) / kRun;
-    std::fill(beams_.low[k] + runs, beams_.low[k] + kRuns, beams_.low[k][0]);
-    std::fill(beams_.high[k] + runs, beams_.high[k] + kRuns, beams_.high[k][0]);
   }
   beams_.blocked.assign(scene_.tiles->count * kRuns, 0);
 }
@@ -443,7 +434,7 @@ HWY_INLINE std::uint32_t BeamSolver::RunsBehind(std::size_t at, const Window& le
   const Vec lowest = hn::Set(d, beams_.leaf_low[2][at] - kPad);
   std::uint32_t runs = 0;
   for (std::size_t run = 0; run < kRuns; run += hn::Lanes(d)) {
-    LaneMask overlap = hn::Gt(hn::Load(d, beams_.high[2] + run), lowest);
+    LaneMask overlap = hn::Gt(hn::Load(d, beams_.farthest + run), lowest);
     for (std::size_t k = 0; k < kSlopes; ++k) {
       overlap = hn::And(overlap, hn::And(hn::Le(hn::Load(d, run_low_[k] + run), hn::Set(d, leaf.high[k])),
                                          hn::Ge(hn::Load(d, run_high_[k] + run), hn::Set(d, leaf.low[k]))));

@@ -101,10 +101,10 @@ struct BeamScratch {
   alignas(64) float x[kReceivers], y[kReceivers], height[kReceivers], inverse[kReceivers], slope[2][kReceivers];
   alignas(64) float x_by_run[kReceivers], y_by_run[kReceivers], inverse_by_run[kReceivers];  // [receiver of a run][run]
   alignas(64) std::uint32_t own[kReceivers],
-      leaf_to_skip[kReceivers];                     // BlockerTree::place; a leaf that cannot block it
-  alignas(64) float low[3][kRuns], high[3][kRuns];  // boxes of the runs, light's frame
-  vec3 box_low[kRuns], box_high[kRuns];             // lattice
-  std::uint16_t valid[kRuns];                       // bits of receivers
+      leaf_to_skip[kReceivers];          // BlockerTree::place; a leaf that cannot block it
+  alignas(64) float farthest[kRuns];     // greatest z of a run's receivers
+  vec3 box_low[kRuns], box_high[kRuns];  // lattice
+  std::uint16_t valid[kRuns];            // bits of receivers
   Slopes leaf_slopes;
   // Leaves that the samples at work may see before the cluster, their boxes, and whether their slopes are of corners.
   std::vector<std::uint32_t> leaf;
