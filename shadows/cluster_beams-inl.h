@@ -166,7 +166,18 @@ class BeamSolver {
   /// Slopes between which a sample sees something.
   struct Slopes {
     Vec low[kSlopes], high[kSlopes];
+
+    Slopes() {
+      const Tag d;
+      for (std::size_t k = 0; k < kSlopes; ++k) low[k] = hn::Set(d, 1e30f), high[k] = hn::Set(d, -1e30f);
+    }
+    HWY_INLINE void Add(const std::array<Vec, kSlopes>& slope) {
+      for (std::size_t k = 0; k < kSlopes; ++k)
+        low[k] = hn::Min(low[k], slope[k]), high[k] = hn::Max(high[k], slope[k]);
+    }
   };
+  /// Of a point that is seen at the first two.
+  static HWY_INLINE std::array<Vec, kSlopes> SlopesOf(Vec x, Vec y) { return {x, y, hn::Add(x, y), hn::Sub(x, y)}; }
   struct Window {
     float low[kSlopes], high[kSlopes];
   };
@@ -345,8 +356,7 @@ HWY_NOINLINE void BeamSolver::Tighten(std::size_t at) {
   const BlockerTree::Leaf& leaf = scene_.tree->leaves[beams_.leaf[at]];
   const Vec3 axes[2] = {Splat(vec3(scene_.frame.u)), Splat(vec3(scene_.frame.v))}, normal = Splat(vec3(scene_.frame.n));
   const Vec3 origin = Splat(vec3(scene_.frame.origin));
-  Vec low[kSlopes], high[kSlopes];
-  for (std::size_t k = 0; k < kSlopes; ++k) low[k] = hn::Set(d, 1e30f), high[k] = hn::Set(d, -1e30f);
+  Slopes seen;
   for (std::size_t i = 0; i < BlockerTree::kWidth; i += hn::Lanes(d)) {
     for (const auto& corner : leaf.corner) {
       const Vec3 p =
@@ -354,9 +364,7 @@ HWY_NOINLINE void BeamSolver::Tighten(std::size_t at) {
       const Vec inverse = Reciprocal(Dot(p, normal));
       const Vec x = hn::Mul(hn::Sub(Dot(p, axes[0]), hn::Set(d, middle_[0])), inverse),
                 y = hn::Mul(hn::Sub(Dot(p, axes[1]), hn::Set(d, middle_[1])), inverse);
-      const Vec slope[kSlopes] = {x, y, hn::Add(x, y), hn::Sub(x, y)};
-      for (std::size_t k = 0; k < kSlopes; ++k)
-        low[k] = hn::Min(low[k], slope[k]), high[k] = hn::Max(high[k], slope[k]);
+      seen.Add(SlopesOf(x, y));
     }
   }
   BeamScratch::Slopes& slopes = beams_.leaf_slopes;
@@ -364,8 +372,8 @@ HWY_NOINLINE void BeamSolver::Tighten(std::size_t at) {
   for (std::size_t k = 0; k < kSlopes; ++k) {
     const float pad = (near * (2.0f * kPad + 8.0f * near * off_plane_) + receiver_pad_) *
                       (k < 2 ? 1.0f : 2.0f);  // two slopes' errors
-    slopes.low[k][at] = std::max(slopes.low[k][at], hn::GetLane(hn::MinOfLanes(d, low[k])) - pad);
-    slopes.high[k][at] = std::min(slopes.high[k][at], hn::GetLane(hn::MaxOfLanes(d, high[k])) + pad);
+    slopes.low[k][at] = std::max(slopes.low[k][at], hn::GetLane(hn::MinOfLanes(d, seen.low[k])) - pad);
+    slopes.high[k][at] = std::min(slopes.high[k][at], hn::GetLane(hn::MaxOfLanes(d, seen.high[k])) + pad);
   }
 }
 
@@ -380,15 +388,12 @@ void BeamSolver::SolveSample(std::size_t i, const vec3& sample, std::uint32_t nu
   std::fill_n(low, kSlopes, 1e30f), std::fill_n(high, kSlopes, -1e30f);
   for (std::size_t j = 0; j < kRuns; j += lanes) {
     Slopes runs;
-    for (std::size_t k = 0; k < kSlopes; ++k) runs.low[k] = hn::Set(d, 1e30f), runs.high[k] = hn::Set(d, -1e30f);
     for (std::size_t r = 0; r < kRun; ++r) {
       const std::size_t at = r * kRuns + j;
       const Vec inverse = hn::Load(d, beams_.inverse_by_run + at);
       const Vec x = hn::NegMulAdd(inverse, u, hn::Load(d, beams_.x_by_run + at)),
                 y = hn::NegMulAdd(inverse, v, hn::Load(d, beams_.y_by_run + at));
-      const Vec slope[kSlopes] = {x, y, hn::Add(x, y), hn::Sub(x, y)};
-      for (std::size_t k = 0; k < kSlopes; ++k)
-        runs.low[k] = hn::Min(runs.low[k], slope[k]), runs.high[k] = hn::Max(runs.high[k], slope[k]);
+      runs.Add(SlopesOf(x, y));
     }
     for (std::size_t k = 0; k < kSlopes; ++k) {
       hn::Store(runs.low[k], d, run_low_[k] + j), hn::Store(runs.high[k], d, run_high_[k] + j);
@@ -463,8 +468,7 @@ HWY_INLINE void BeamSolver::TestLeaf(std::size_t at, const vec3& sample, Window 
     for (std::size_t i = 0; i < kRun; i += hn::Lanes(d)) {
       const std::size_t r = run * kRun + i;
       LaneMask within = hn::Gt(hn::Load(d, beams_.height + r), lowest);
-      const Vec x = hn::Load(d, beams_.slope[0] + r), y = hn::Load(d, beams_.slope[1] + r);
-      const Vec slope[kSlopes] = {x, y, hn::Add(x, y), hn::Sub(x, y)};
+      const auto slope = SlopesOf(hn::Load(d, beams_.slope[0] + r), hn::Load(d, beams_.slope[1] + r));
       for (std::size_t k = 0; k < kSlopes; ++k) {
         within = hn::And(
             within, hn::And(hn::Le(slope[k], hn::Set(d, leaf.high[k])), hn::Ge(slope[k], hn::Set(d, leaf.low[k]))));
