@@ -59,7 +59,8 @@ void make_hair(std::uint32_t index, const dvec3& center, dvec3* positions) {
   Random random(0x4a125u, index);
   dvec3 along = random.direction();
   dvec3 point = center + along * 0.97;
-  const dvec3 curl = random.direction() * random.range(0.1, 0.5);
+  const double curliness = random.range(0.1, 0.5);  // drawn first: which operand of a product is, compilers may choose
+  const dvec3 curl = random.direction() * curliness;
   const double step = random.range(0.09, 0.14), radius = random.range(0.006, 0.011);
   dvec3 normal = perpendicular(along);
   for (std::uint32_t ring = 0; ring < kHairRings; ++ring) {
