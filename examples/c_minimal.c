@@ -4,7 +4,8 @@
 
 #include "halfshade/c_api.h"
 
-enum { WIDTH = 64, HEIGHT = 24 };
+#define WIDTH 64
+#define HEIGHT 24
 
 int main(void) {
   const float plate[4][3] = {{-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}};
