@@ -30,16 +30,6 @@ struct Options {
   double verify_percent = 1.0, verify_seconds = 10.0;
 };
 
-/// What the exact engine keeps of a scene that does not move, as Embree keeps its tree: certificates and the tree of
-/// blockers. Everything that depends on the light or on receivers is made anew in every run.
-struct KeptExact {
-  ClosedComponents closed;
-  BlockerTree tree;
-  ExactLight light;
-  ExactWork work;
-  double build_ms = 0.0;
-};
-
 struct MethodResult {
   std::string name;
   ShadowConfig config;
@@ -47,7 +37,8 @@ struct MethodResult {
   ShadowStats stats;
   OracleCheck check;
   Timing timing;
-  std::shared_ptr<KeptExact> kept;  // exact: what a static scene keeps; null for other methods
+  std::unique_ptr<KeptExact> kept = std::make_unique<KeptExact>();  // what a static scene keeps, as Embree its tree
+  double build_ms = 0.0;                                            // what that took; the times leave it out
 };
 
 struct RivalResult {
@@ -63,25 +54,8 @@ struct Row {
   std::string method;
 };
 
-std::shared_ptr<KeptExact> build_exact(const Case& c) {
-  auto kept = std::make_shared<KeptExact>();
-  Stopwatch watch;
-  kept->closed = find_closed_components(c.mesh);
-  build_blocker_tree(c.mesh, kept->tree);
-  kept->build_ms = watch.lap();
-  return kept;
-}
-
 void solve(const Case& c, MethodResult& method) {
-  if (method.kept) {
-    KeptExact& k = *method.kept;
-    method.stats = {};
-    prepare_exact_light(c.light, c.samples, k.light);  // forgets how the tree looked from the light
-    solve_exact({c.mesh, &k.closed, &k.tree}, c.receivers, c.light, c.samples, method.config, k.light, k.work,
-                method.masks, method.stats);
-    return;
-  }
-  solve_masks(c.mesh, c.receivers, c.light, c.samples, method.config, method.masks, method.stats);
+  solve_masks(c.mesh, c.receivers, c.light, c.samples, method.config, method.masks, method.stats, method.kept.get());
 }
 
 ShadowConfig config_of(const Options& o) {
@@ -100,8 +74,8 @@ std::vector<MethodResult> solve_all(const Case& c, const Options& o) {
     m.name = name;
     m.config = config_of(o);
     m.config.method = shadow_method_from_name(name);
-    if (m.config.method == ShadowMethod::kExact) m.kept = build_exact(c);
     solve(c, m);
+    if (m.config.method == ShadowMethod::kExact) m.build_ms = m.stats.build_ms;
     m.check = check_with_oracle(c, m.masks, o.verify_percent, o.verify_seconds);
   }
   return methods;
@@ -164,9 +138,6 @@ const RivalResult* best_of(const std::vector<RivalResult>& rivals, bool robust_o
   return best;
 }
 
-/// What the method's times leave out.
-double build_ms_of(const MethodResult& m) { return m.kept ? m.kept->build_ms : 0.0; }
-
 ordered_json case_json(const Case& c, const std::vector<MethodResult>& methods,
                        const std::vector<RivalResult>& rivals) {
   ordered_json json = {{"scene", c.scene},
@@ -177,7 +148,7 @@ ordered_json case_json(const Case& c, const std::vector<MethodResult>& methods,
                        {"light_samples", c.samples.count},
                        {"receivers", c.receivers.size()}};
   for (const MethodResult& m : methods) {
-    ordered_json entry = {{"name", m.name}, {"build_ms", build_ms_of(m)}, {"mask_hash", m.masks.hash()}};
+    ordered_json entry = {{"name", m.name}, {"build_ms", m.build_ms}, {"mask_hash", m.masks.hash()}};
     entry["shadow"] = timing_json(m.timing);
     entry["stages_of_last_run"] = {
         {"index_ms", m.stats.index_ms}, {"cull_ms", m.stats.cull_ms}, {"test_ms", m.stats.test_ms}};
@@ -222,7 +193,7 @@ std::vector<Row> run_case(const Case& c, const Options& o, int threads, ordered_
                spread(m.timing));
     if (best != nullptr) {
       rows.push_back({c.light_percent, best->timing.median() / own, robust->timing.median() / own,
-                      (total->timing.median() + total->build_ms) / (own + build_ms_of(m)), m.name});
+                      (total->timing.median() + total->build_ms) / (own + m.build_ms), m.name});
       fmt::print(" {:>9.1f} {:<17} {:<32} {:>6.2f} {:>7.2f} {:>7.0f} {:>7.2f}  {:>12}", best->timing.median(),
                  spread(best->timing), best->mode.name(), rows.back().ratio, rows.back().ratio_robust, best->build_ms,
                  rows.back().ratio_with_build, best->wrong_bits);

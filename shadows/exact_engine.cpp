@@ -247,19 +247,21 @@ void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, 
   solve_grazing(blockers.mesh, receivers, light, samples, work.side, config, masks, stats);
 }
 
+void KeptExact::build(const LatticeMesh& mesh, bool certificates) {
+  if (certificates && !has_closed) closed = find_closed_components(mesh), has_closed = true;
+  if (!has_tree) build_blocker_tree(mesh, tree), has_tree = true;
+}
+
 void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
+                 const LightSamples& samples, const ShadowConfig& config, KeptExact& kept, VisibilityMasks& masks,
+                 ShadowStats& stats) {
   Stopwatch watch;
-  ExactLight kept;
-  ExactWork work;
-  ClosedComponents closed;
-  prepare_exact_light(light, samples, kept);
-  if (config.back_face_casters) closed = find_closed_components(mesh);
-  BlockerTree tree;
-  build_blocker_tree(mesh, tree);
+  kept.build(mesh, config.back_face_casters);
   stats.build_ms += watch.lap();
-  const ExactBlockers blockers{mesh, config.back_face_casters ? &closed : nullptr, &tree};
-  solve_exact(blockers, receivers, light, samples, config, kept, work, masks, stats);
+  prepare_exact_light(light, samples, kept.light);
+  stats.index_ms += watch.lap();
+  const ExactBlockers blockers{mesh, config.back_face_casters ? &kept.closed : nullptr, &kept.tree};
+  solve_exact(blockers, receivers, light, samples, config, kept.light, kept.work, masks, stats);
 }
 
 }  // namespace halfshade

@@ -81,6 +81,19 @@ struct ExactWork {
   void reserve(std::size_t count);
 };
 
+/// What calls with one mesh share: certificates and the tree of blockers, once they are made, and memory. Everything
+/// that depends on the light or on receivers is made anew in every call. One call at a time.
+struct KeptExact {
+  ClosedComponents closed;
+  BlockerTree tree;
+  bool has_closed = false, has_tree = false;
+  ExactLight light;
+  ExactWork work;
+
+  /// Makes of `mesh`, which must be the same in all calls, what is not there yet.
+  void build(const LatticeMesh& mesh, bool certificates);
+};
+
 /// What `kept` held before gives its memory.
 void prepare_exact_light(const Light& light, const LightSamples& samples, ExactLight& kept);
 
@@ -95,8 +108,9 @@ void solve_exact(const ExactBlockers& blockers, const ReceiverArray& receivers, 
                  VisibilityMasks& masks, ShadowStats& stats);
 
 /// Masks of all receivers, exact. Receivers in the light's plane or near to a light that has none are handed to the
-/// alias-free shadow map, which gives the same masks.
+/// alias-free shadow map, which gives the same masks. stats.build_ms is what making `kept` took.
 void solve_exact(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats);
+                 const LightSamples& samples, const ShadowConfig& config, KeptExact& kept, VisibilityMasks& masks,
+                 ShadowStats& stats);
 
 }  // namespace halfshade

@@ -112,8 +112,9 @@ void solve_opaque(const LatticeMesh& mesh, const Division& division, const Recei
     masks.reset(receivers.size(), samples.count);
     return;
   }
+  KeptExact kept;
   if (division.perforated.empty()) {
-    solve_exact(mesh, receivers, light, samples, config, masks, stats);
+    solve_exact(mesh, receivers, light, samples, config, kept, masks, stats);
     return;
   }
   LatticeMesh part;  // without a scene no triangle has a texture
@@ -126,7 +127,7 @@ void solve_opaque(const LatticeMesh& mesh, const Division& division, const Recei
   }
   ReceiverArray same = receivers;
   for (std::uint32_t& own : same.triangle) own = own == kNone ? kNone : place[own];
-  solve_exact(part, same, light, samples, config, masks, stats);
+  solve_exact(part, same, light, samples, config, kept, masks, stats);
 }
 
 /// What is blocked already, in the kernel's order of receivers and samples.

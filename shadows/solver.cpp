@@ -109,8 +109,8 @@ void begin_stats(const OpaqueMesh& opaque, const ReceiverArray& receivers, Shado
 }
 
 void dispatch_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receivers, const Light& light,
-                    const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
-                    ShadowStats& stats) {
+                    const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats,
+                    KeptExact* kept) {
   const OpaqueMesh opaque(scene_mesh);
   const LatticeMesh& mesh = opaque.get();
   begin_stats(opaque, receivers, stats);
@@ -119,9 +119,11 @@ void dispatch_masks(const LatticeMesh& scene_mesh, const ReceiverArray& receiver
     case ShadowMethod::kAliasFreeLookupTable:
       solve_alias_free_shadow_map(mesh, receivers, light, samples, config, masks, stats);
       break;
-    case ShadowMethod::kExact:
-      solve_exact(mesh, receivers, light, samples, config, masks, stats);
+    case ShadowMethod::kExact: {
+      KeptExact own;
+      solve_exact(mesh, receivers, light, samples, config, kept != nullptr ? *kept : own, masks, stats);
       break;
+    }
     case ShadowMethod::kHierarchicalPenumbraCasting:
       solve_hierarchical_penumbra_casting(mesh, receivers, light, samples, config, masks, stats);
       break;
@@ -175,8 +177,9 @@ void solve_without_masks(const LatticeMesh& scene_mesh, const ReceiverArray& rec
 }  // namespace
 
 void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats) {
-  in_call(config, [&] { dispatch_masks(mesh, receivers, light, samples, config, masks, stats); });
+                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats,
+                 KeptExact* kept) {
+  in_call(config, [&] { dispatch_masks(mesh, receivers, light, samples, config, masks, stats, kept); });
 }
 
 std::string method_assumptions(const ShadowConfig& config, const Light& light) {

@@ -7,11 +7,14 @@
 
 namespace halfshade {
 
+struct KeptExact;  // exact_engine.h
+
 /// Masks of `receivers` under one light; fills the counters. Exact methods give equal masks. Translucent triangles
 /// block nothing, here and below; stats.details has their number (transmittance.h). Throws Error{kUsage} for methods
-/// without masks.
+/// without masks. Calls with the same mesh may share `kept`, which method exact then builds once; others ignore it.
 void solve_masks(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
-                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats);
+                 const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks, ShadowStats& stats,
+                 KeptExact* kept = nullptr);
 
 /// Visibility of `receivers` by any method; through masks where the method has them.
 void solve_visibility(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,

@@ -66,7 +66,7 @@ std::uint32_t cells_in_short_runs(std::span<const std::uint64_t, kProbeSide> blo
 
 ThinFeatures find_thin_features(const LatticeMesh& mesh, const ReceiverArray& receivers,
                                 std::span<const float> visibility, const Light& light, const ShadowConfig& config,
-                                std::size_t probes) {
+                                std::size_t probes, KeptExact& kept) {
   ThinFeatures found;
   const auto spacing =  // between the samples in use, in cells; a run is short when it is shorter
       static_cast<std::uint32_t>(std::floor(kProbeSide / std::sqrt(static_cast<double>(config.light_sample_count))));
@@ -74,7 +74,7 @@ ThinFeatures find_thin_features(const LatticeMesh& mesh, const ReceiverArray& re
   const ReceiverArray chosen = choose_probes(receivers, visibility, probes);
   if (chosen.size() == 0) return found;
   ShadowConfig fine = config;
-  fine.method = ShadowMethod::kAliasFreeShadowMap;  // needs no structure over the blockers
+  fine.method = kept.has_tree ? ShadowMethod::kExact : ShadowMethod::kAliasFreeShadowMap;
   fine.light_sample_count = kProbeSide * kProbeSide;
   fine.pattern = SamplePattern::kUniform;
   fine.sample_sets = 1;
@@ -83,7 +83,7 @@ ThinFeatures find_thin_features(const LatticeMesh& mesh, const ReceiverArray& re
   const LightSamples samples = make_light_samples(light, fine, mesh.frame);
   VisibilityMasks masks;
   ShadowStats stats;
-  solve_masks(mesh, chosen, light, samples, fine, masks, stats);
+  solve_masks(mesh, chosen, light, samples, fine, masks, stats, &kept);
   found.probes = chosen.size();
   std::uint64_t cells = 0;
   for (std::size_t i = 0; i < chosen.size(); ++i) {

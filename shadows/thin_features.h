@@ -8,6 +8,7 @@
 #pragma once
 
 #include "halfshade/shadows.h"
+#include "shadows/exact_engine.h"
 #include "shadows/receivers.h"
 
 namespace halfshade {
@@ -23,10 +24,11 @@ inline constexpr std::uint32_t kProbeSide = 64;  // cells of the fine grid per a
 
 /// Looks from `probes` receivers, spread over all that are not in umbra (visibility[i] > 0), for features narrower than
 /// 1 / sqrt(config.light_sample_count) of the light. No probes for lights without area, for explicit samples, and from
-/// half kProbeSide samples per axis on. Throws and runs as solve_masks.
+/// half kProbeSide samples per axis on. Throws and runs as solve_masks. By the method exact where `kept` has its tree,
+/// else by one that builds nothing.
 ThinFeatures find_thin_features(const LatticeMesh& mesh, const ReceiverArray& receivers,
                                 std::span<const float> visibility, const Light& light, const ShadowConfig& config,
-                                std::size_t probes);
+                                std::size_t probes, KeptExact& kept);
 
 /// Cells of runs shorter than `shortest`, not counting those that touch the border; `blocked` has one row of the light
 /// per word, bit i is column i. Runs of ones and of zeros, along rows and along columns.

@@ -82,7 +82,7 @@ const VisibilityMasks& ChartSubject::exact_answer(Question& question, const Shad
     config.light_sample_count = asked.light_sample_count;
     config.progress = [](double) { return stop_signal() == 0; };
     ShadowStats stats;
-    solve_masks(pipeline_.mesh, question.receivers, light_, question.samples, config, question.exact, stats);
+    solve_masks(pipeline_.mesh, question.receivers, light_, question.samples, config, question.exact, stats, &kept_);
     check_with_oracle(question);
   }
   return question.exact;
@@ -138,7 +138,7 @@ void ChartSubject::make_reference() {
     config.frame = kReferenceFrame + set;
     const LightSamples samples = make_light_samples(light_, config, pipeline_.mesh.frame);
     const ReceiverArray receivers = make_receivers(pipeline_.gbuffer, samples, config.seed);
-    solve_masks(pipeline_.mesh, receivers, light_, samples, config, masks, stats);
+    solve_masks(pipeline_.mesh, receivers, light_, samples, config, masks, stats, &kept_);
     ++sets_of_half[set % 2];
     reference_samples_ += samples.count;
     for (std::size_t i = 0; i < receivers.size(); ++i) {

@@ -55,6 +55,7 @@ class ChartSubject {
   const Pipeline& pipeline_;
   const Light& light_;
   const ChartOptions& options_;
+  KeptExact kept_;  // for truth and reference; what is timed builds its own
   std::function<void(std::uint32_t)> on_set_;
   std::string inputs_hash_;
   std::map<std::uint32_t, Question> questions_;  // by number of light samples

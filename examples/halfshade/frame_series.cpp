@@ -49,7 +49,7 @@ void FrameSource::draw_frame(std::uint32_t frame) {
 void FrameSource::add(const Light& light, const ShadowConfig& config, VisibilityAccumulator& sum) {
   const LightSamples samples = make_light_samples(light, config, pipeline_.mesh.frame);
   receivers_ = make_receivers(pipeline_.gbuffer, samples, config.seed);
-  solve_masks(pipeline_.mesh, receivers_, light, samples, config, masks_, stats_);
+  solve_masks(pipeline_.mesh, receivers_, light, samples, config, masks_, stats_, &pipeline_.exact);
   sum.add(receivers_.sample, masks_);
   sum.add_hidden(facing_away(), samples.count);
 }

@@ -61,7 +61,7 @@ double solve_band(Render& render, const Journal& journal, const PartRange& rows,
     ShadowStats stats;
     Stopwatch watch;
     solve_masks(render.mesh, slice(whole.receivers, first, last), render.source.view.lights[l], whole.samples, config,
-                masks, stats);
+                masks, stats, &render.exact);
     PartLight& light = part.lights[l];
     light.shadow_ms = watch.lap();
     light.range = rows;

@@ -145,7 +145,7 @@ nlohmann::ordered_json method_json(const PipelineOptions& o) {
 
 void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                            const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
-                           std::vector<float>& visibility, ShadowStats& stats) {
+                           std::vector<float>& visibility, ShadowStats& stats, KeptExact* kept) {
   if (!yields_masks(config)) {
     masks = {};
     solve_visibility(mesh, receivers, light, samples, config, visibility, stats);
@@ -154,7 +154,7 @@ void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receive
   if (config.method == ShadowMethod::kRaytrace) {
     solve_raytrace(OpaqueMesh(mesh).get(), receivers, samples, config, masks, stats);
   } else {
-    solve_masks(mesh, receivers, light, samples, config, masks, stats);
+    solve_masks(mesh, receivers, light, samples, config, masks, stats, kept);
   }
   visibility_of(masks, visibility);
 }

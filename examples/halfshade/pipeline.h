@@ -8,6 +8,7 @@
 #include "rasterizer/bent_normals.h"
 #include "rasterizer/rasterizer.h"
 #include "scene_source.h"
+#include "shadows/exact_engine.h"
 #include "shadows/panes.h"
 #include "shadows/receivers.h"
 #include "verbs.h"
@@ -32,7 +33,8 @@ struct Pipeline {
   RasterConfig raster;
   std::uint32_t subsamples = 1;  // per axis and pixel
   LatticeMesh mesh;
-  Panes panes;  // translucent triangles of the mesh
+  Panes panes;      // translucent triangles of the mesh
+  KeptExact exact;  // what method exact makes of the mesh, for all lights and frames
   GBuffer gbuffer;
   RasterStats raster_stats;
   std::optional<BentNormals> bent_normals;  // with --shading bent
@@ -67,10 +69,10 @@ ShadowConfig shadow_config(const PipelineOptions& options);
 nlohmann::ordered_json method_json(const PipelineOptions& options);
 
 /// One light by the configured method: masks, where it yields them, and visibility per receiver; of the opaque
-/// triangles.
+/// triangles. `kept` as for solve_masks.
 void solve_light_by_method(const LatticeMesh& mesh, const ReceiverArray& receivers, const Light& light,
                            const LightSamples& samples, const ShadowConfig& config, VisibilityMasks& masks,
-                           std::vector<float>& visibility, ShadowStats& stats);
+                           std::vector<float>& visibility, ShadowStats& stats, KeptExact* kept = nullptr);
 
 /// body() in an arena of the asked number of threads.
 void run_in_arena(int threads, const std::function<void()>& body);

@@ -104,13 +104,13 @@ void verify(const Render& render, const Light& light, LightResult& result) {
 }
 
 /// Says so where at least one probe in a hundred sees features that the light's samples are too far apart for.
-void look_for_thin_features(const Render& render, const Light& light, ShadowConfig config, LightResult& result) {
+void look_for_thin_features(Render& render, const Light& light, ShadowConfig config, LightResult& result) {
   if (!yields_masks(config)) return;
   Stopwatch watch;
   Progress progress("features of " + light.name, true);
   config.progress = [&progress](double done) { return progress(done); };
   result.thin = find_thin_features(render.mesh, result.receivers, result.receiver_visibility, light, config,
-                                   render.options.probes);
+                                   render.options.probes, render.exact);
   result.probe_ms = watch.lap();
   if (result.thin.seeing == 0 || result.thin.share() < 0.01) return;
   fmt::print(stderr,
@@ -179,7 +179,7 @@ void solve_light(Render& render, const Light& light) {
     Progress progress("shadows of " + light.name, render.options.quiet);
     config.progress = [&progress](double done) { return progress(done); };
     solve_light_by_method(render.mesh, result.receivers, light, result.samples, config, result.masks,
-                          result.receiver_visibility, result.stats);
+                          result.receiver_visibility, result.stats, &render.exact);
   }
   result.shadow_ms = watch.lap();
   look_for_thin_features(render, light, config, result);

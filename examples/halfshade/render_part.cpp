@@ -73,7 +73,7 @@ std::uint32_t row_length(const LightSamples& samples, std::uint32_t parts) {
 }
 
 /// The masks of a light that belong to the part; fills ranges and counts.
-void solve_share(const Render& render, PartSplit split, PartNumber number, const LightResult& asked, const Light& light,
+void solve_share(Render& render, PartSplit split, PartNumber number, const LightResult& asked, const Light& light,
                  PartLight& result, VisibilityMasks& masks) {
   ShadowConfig config = shadow_config(render.options);
   Progress progress("shadows of " + light.name, render.options.quiet);
@@ -83,13 +83,14 @@ void solve_share(const Render& render, PartSplit split, PartNumber number, const
   result.receivers_hash = receivers_hash(render.gbuffer, asked.receivers, 0, count);
   Stopwatch watch;
   if (split == PartSplit::kCrop) {
-    solve_masks(render.mesh, asked.receivers, light, asked.samples, config, masks, stats);
+    solve_masks(render.mesh, asked.receivers, light, asked.samples, config, masks, stats, &render.exact);
   } else if (split == PartSplit::kSamples) {
     result.whole = {0, asked.samples.count};
     result.range = share_of(result.whole, number, row_length(asked.samples, number.count));
     masks.reset(count, static_cast<std::uint32_t>(result.range.size()));
     const LightSamples samples = samples_of_share(asked.samples, result.range);
-    if (samples.count > 0) solve_masks(render.mesh, asked.receivers, light, samples, config, masks, stats);
+    if (samples.count > 0)
+      solve_masks(render.mesh, asked.receivers, light, samples, config, masks, stats, &render.exact);
   } else {
     result.whole = {0, render.mesh.triangles.size()};
     result.range = share_of(result.whole, number);

@@ -19,7 +19,14 @@ ThinFeatures look(const std::vector<Triangle>& triangles, const std::vector<dvec
   const LocalFrame frame = make_local_frame(scene.positions, receiver_reach(receivers, light));
   const ReceiverRequest q = make_receiver_request(frame, receivers, light, config);
   const std::vector<float> visibility(q.receivers.size(), 1.0f);
-  return find_thin_features(make_lattice_mesh(scene, frame), q.receivers, visibility, light, config, 100);
+  const LatticeMesh mesh = make_lattice_mesh(scene, frame);
+  KeptExact nothing, kept;
+  kept.build(mesh, true);
+  const ThinFeatures found = find_thin_features(mesh, q.receivers, visibility, light, config, 100, nothing);
+  const ThinFeatures by_tree = find_thin_features(mesh, q.receivers, visibility, light, config, 100, kept);
+  CHECK(by_tree.seeing == found.seeing);
+  CHECK(by_tree.share_of_light == found.share_of_light);
+  return found;
 }
 
 /// Short runs one cell at a time: the definition.
