@@ -163,22 +163,13 @@ HWY_INLINE Rectangle ProjectCloud(const SampleCloud& cloud, const Shaft& box) {
   return {low[0], low[1], high[0], high[1]};
 }
 
-/// Groups that the shaft from a box of receivers meets, what hides most first; false where there are none and all of
-/// the receivers are lit.
-HWY_INLINE bool ListGroups(const ExactScene& scene, Shaft shaft, ExactScratch& scratch) {
+/// From a box of receivers to the light.
+HWY_INLINE Shaft ShaftToLight(const ExactScene& scene, Shaft shaft) {
   Rectangle light{scene.rows->low.x, scene.rows->low.y, scene.rows->high.x, scene.rows->high.y};
   if (scene.cloud != nullptr) light = ProjectCloud(*scene.cloud, shaft), shaft.floor = scene.cloud->low.z;
   const float pad = ProjectionPad(shaft.low[2]);
   shaft.light = {light.low_u - pad, light.low_v - pad, light.high_u + pad, light.high_v + pad};
-  CollectGroups(*scene.fit, shaft, scratch);
-  scratch.leaves_listed += scratch.group.size();
-  if (scratch.group.empty()) {
-    ++scratch.clusters_lit;
-    return false;
-  }
-  scratch.gain.resize(scene.fit->nodes.size());  // of a thread that nobody expected
-  SortGroups(shaft, scratch);
-  return true;
+  return shaft;
 }
 
 }  // namespace HWY_NAMESPACE

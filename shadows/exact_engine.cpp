@@ -13,7 +13,14 @@
 namespace halfshade {
 namespace {
 
-constexpr std::size_t kClustersPerTask = 2;
+/// Receivers of a task, at most: two clusters.
+constexpr std::size_t kTaskReceivers = 2 * kClusterReceivers;
+
+/// Few receivers are shared out as well: each of them may take as long as a packet elsewhere.
+std::size_t receivers_per_task(std::size_t count) {
+  constexpr std::size_t kLeast = 16, kTasksPerThread = 8;
+  return std::clamp(count / (kTasksPerThread * concurrency()) / kLeast * kLeast, kLeast, kTaskReceivers);
+}
 
 /// Receivers nearer to the light's plane than this are not projected onto it: they go to the alias-free shadow map.
 constexpr double kGrazing = 1e-5;
@@ -99,15 +106,15 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   const bool beams = kept.tiles.count != 0 && side.fit.alpha.empty();
   const ExactScene scene{blockers.tree, &side.fit, &samples,   beams ? &kept.tiles : nullptr,
                          &kept.rows,    cloud,     side.frame, work.beams};
-  constexpr std::size_t kPerTask = kClusterReceivers * kClustersPerTask, kTasksPerRound = 128;
-  const std::size_t tasks = (order.size() + kPerTask - 1) / kPerTask;
+  constexpr std::size_t kTasksPerRound = 128;
+  const std::size_t per_task = receivers_per_task(order.size()), tasks = (order.size() + per_task - 1) / per_task;
   work.scratches.start(concurrency(), *blockers.tree, kept, beams);
   for (std::size_t first = 0; first < tasks; first += kTasksPerRound) {
     report_progress(config, static_cast<double>(first) / static_cast<double>(tasks));
     parallel_tasks(std::min(kTasksPerRound, tasks - first), [&](std::size_t t) {
       const ScratchLoan scratch(work.scratches);
-      const std::size_t task_end = std::min(order.size(), (first + t + 1) * kPerTask);
-      for (std::size_t begin = (first + t) * kPerTask; begin < task_end; begin += kClusterReceivers) {
+      const std::size_t task_end = std::min(order.size(), (first + t + 1) * per_task);
+      for (std::size_t begin = (first + t) * per_task; begin < task_end; begin += kClusterReceivers) {
         check_run();
         solve_cluster(scene, begin, std::min(task_end, begin + kClusterReceivers), kernel, *scratch);
       }

@@ -382,11 +382,43 @@ void SolveByPackets(const ExactScene& given, const ReceiverBox& cluster, std::si
   for (std::size_t i = begin; i < end; i += lanes) solver.Solve(i, std::min(lanes, end - i));
 }
 
+/// Receivers [begin, end) and their shaft to the light.
+ReceiverBox BoxOf(const ExactScene& scene, std::size_t begin, std::size_t end, const KernelReceivers& receivers) {
+  ReceiverBox box;
+  for (std::size_t i = begin; i < end; ++i) box.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
+  box.shaft = ShaftToLight(scene, box.shaft);
+  return box;
+}
+
+/// Are receivers so far from each other, against the light, that what one sees tells little about the others? In a
+/// picture of usual size hardly any are, but probes are, and the points of small pictures.
+bool AreScattered(const Shaft& shaft, std::size_t count, std::size_t groups) {
+  constexpr std::size_t kFewGroups = 16;
+  constexpr float kWide = 1.0f, kFarApart = 0.15f;  // the box, and the distance between neighbours, in lights
+  if (count == 1 || groups < kFewGroups) return false;
+  float extent = 0.0f;
+  for (int k = 0; k < 3; ++k) extent = std::max(extent, shaft.high[k] - shaft.low[k]);
+  const float light = std::max(shaft.light.high_u - shaft.light.low_u, shaft.light.high_v - shaft.light.low_v);
+  return extent > light * std::min(kWide, kFarApart * std::sqrt(static_cast<float>(count)));
+}
+
 void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
                   ExactScratch& scratch) {
-  ReceiverBox cluster;
-  for (std::size_t i = begin; i < end; ++i) cluster.add(scene.frame, {receivers.x[i], receivers.y[i], receivers.z[i]});
-  if (!ListGroups(scene, cluster.shaft, scratch)) return;
+  const ReceiverBox cluster = BoxOf(scene, begin, end, receivers);
+  CollectGroups(*scene.fit, cluster.shaft, scratch);
+  if (scratch.group.empty()) {
+    ++scratch.clusters_lit;
+    return;
+  }
+  if (AreScattered(cluster.shaft, end - begin, scratch.group.size())) {
+    const std::size_t middle = begin + (end - begin) / 2;
+    SolveCluster(scene, begin, middle, receivers, scratch);
+    SolveCluster(scene, middle, end, receivers, scratch);
+    return;
+  }
+  scratch.leaves_listed += scratch.group.size();
+  scratch.gain.resize(scene.fit->nodes.size());  // of a thread that nobody expected
+  SortGroups(cluster.shaft, scratch);
   const BeamChoice::Cluster work{end - begin, scratch.group.size(), scene.samples->count};
   const bool takes_beams = scene.tiles != nullptr && scratch.choice.takes_beams(work, scene.beams);
   Stopwatch watch;

@@ -8,6 +8,7 @@
 #include "shadows/blocker_tree.h"
 #include "shadows/exact_engine.h"
 #include "shadows/light_view.h"
+#include "shadows/solver.h"
 #include "support/exact_ways.h"
 
 using namespace halfshade;
@@ -511,6 +512,50 @@ TEST_CASE("beams give the oracle's bits to receivers anywhere, on triangles that
       const VisibilityMasks masks = solve_exact_by(Beams::kAlways, scene, receivers, light, config, &stats);
       CHECK(wrong_bits(masks, solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
       CHECK(stats.clusters_by_sample > 3);
+    }
+  }
+}
+
+TEST_CASE("receivers far from each other ask each for itself, and get the oracle's bits") {
+  const Scene scene = scene_of(random_triangles(43, 6000));
+  Light light = frame_light();
+  light.u *= 0.2, light.v *= 0.2;
+  const ShadowConfig config = frame_config(100);
+  Random random(44);
+  std::vector<Receiver> receivers;
+  for (int i = 0; i < 48; ++i) receivers.push_back({random.in_box(-4.0, 4.0), kNone});
+  ShadowStats together;
+  const VisibilityMasks masks = solve(scene, receivers, light, config, ShadowMethod::kExact, &together);
+  CHECK(wrong_bits(masks, solve(scene, receivers, light, config, ShadowMethod::kOracle)) == 0);
+  std::uint64_t listed = 0;  // lists of 16 receivers each would be a seventh of that
+  for (const Receiver& receiver : receivers) {
+    ShadowStats alone;
+    solve(scene, {receiver}, light, config, ShadowMethod::kExact, &alone);
+    listed += alone.leaves_listed;
+  }
+  CHECK(2 * together.leaves_listed > listed);
+}
+
+TEST_CASE("calls that keep what method exact builds get the masks of calls that do not") {
+  const Scene scene = scene_of(random_triangles(45, 500));
+  Random random(46);
+  std::vector<Receiver> receivers;
+  for (int i = 0; i < 80; ++i) receivers.push_back({random.in_box(-4.0, 4.0), kNone});
+  KeptExact kept;
+  Light light = frame_light();
+  const LatticeMesh mesh =
+      make_lattice_mesh(scene, make_local_frame(scene.positions, receiver_reach(receivers, light)));
+  for (const bool certificates : {false, true, true}) {
+    for (const LightShape shape : {LightShape::kRectangle, LightShape::kSphere, LightShape::kPoint}) {
+      light.shape = shape, light.radius = 0.5;
+      ShadowConfig config = frame_config(60);
+      config.back_face_casters = certificates;
+      const ReceiverRequest request = make_receiver_request(mesh.frame, receivers, light, config);
+      VisibilityMasks alone, masks;
+      ShadowStats stats;
+      solve_masks(mesh, request.receivers, light, request.samples, config, alone, stats);
+      solve_masks(mesh, request.receivers, light, request.samples, config, masks, stats, &kept);
+      CHECK(masks.words == alone.words);
     }
   }
 }

@@ -13,17 +13,11 @@ inline VisibilityMasks solve_exact_by(Beams beams, const Scene& scene, const std
   const LatticeMesh mesh =
       make_lattice_mesh(scene, make_local_frame(scene.positions, receiver_reach(receivers, light)));
   const ReceiverRequest request = make_receiver_request(mesh.frame, receivers, light, config);
-  ExactLight kept;
-  ExactWork work;
-  work.beams = beams;
-  prepare_exact_light(light, request.samples, kept);
-  const ClosedComponents closed = find_closed_components(mesh);
-  BlockerTree tree;
-  build_blocker_tree(mesh, tree);
+  KeptExact kept;
+  kept.work.beams = beams;
   VisibilityMasks solved, masks;
   ShadowStats own;
-  solve_exact({mesh, config.back_face_casters ? &closed : nullptr, &tree}, request.receivers, light, request.samples,
-              config, kept, work, solved, stats != nullptr ? *stats : own);
+  solve_exact(mesh, request.receivers, light, request.samples, config, kept, solved, stats != nullptr ? *stats : own);
   spread_masks(request, solved, receivers.size(), masks);
   return masks;
 }
