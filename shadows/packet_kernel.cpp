@@ -390,16 +390,31 @@ ReceiverBox BoxOf(const ExactScene& scene, std::size_t begin, std::size_t end, c
   return box;
 }
 
-/// Are receivers so far from each other, against the light, that what one sees tells little about the others? In a
-/// picture of usual size hardly any are, but probes are, and the points of small pictures.
-bool AreScattered(const Shaft& shaft, std::size_t count, std::size_t groups) {
+/// The median of the boxes of the groups in scratch, along their longest side.
+float UsualExtent(ExactScratch& scratch) {
+  std::vector<float>& extent = scratch.old_bound;
+  extent.assign(scratch.group.size(), 0.0f);
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < extent.size(); ++i)
+      extent[i] = std::max(extent[i], scratch.high[k][i] - scratch.low[k][i]);
+  }
+  const auto middle = extent.begin() + static_cast<std::ptrdiff_t>(extent.size() / 2);
+  std::nth_element(extent.begin(), middle, extent.end());
+  return *middle;
+}
+
+/// Are receivers so far from each other, against the light and the groups that they meet, that what one sees tells
+/// little about the others? In a picture of usual size hardly any are, but probes are, and the points of small
+/// pictures.
+bool AreScattered(const Shaft& shaft, std::size_t count, ExactScratch& scratch) {
   constexpr std::size_t kFewGroups = 16;
-  constexpr float kWide = 1.0f, kFarApart = 0.15f;  // the box, and the distance between neighbours, in lights
-  if (count == 1 || groups < kFewGroups) return false;
+  constexpr float kWide = 1.0f, kFarApart = 0.15f;  // the box, and the distance between neighbours, in lights + groups
+  if (count == 1 || scratch.group.size() < kFewGroups) return false;
   float extent = 0.0f;
   for (int k = 0; k < 3; ++k) extent = std::max(extent, shaft.high[k] - shaft.low[k]);
   const float light = std::max(shaft.light.high_u - shaft.light.low_u, shaft.light.high_v - shaft.light.low_v);
-  return extent > light * std::min(kWide, kFarApart * std::sqrt(static_cast<float>(count)));
+  const float share = std::min(kWide, kFarApart * std::sqrt(static_cast<float>(count)));
+  return extent > share * light && extent > share * (light + UsualExtent(scratch));
 }
 
 void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, KernelReceivers& receivers,
@@ -410,7 +425,7 @@ void SolveCluster(const ExactScene& scene, std::size_t begin, std::size_t end, K
     ++scratch.clusters_lit;
     return;
   }
-  if (AreScattered(cluster.shaft, end - begin, scratch.group.size())) {
+  if (AreScattered(cluster.shaft, end - begin, scratch)) {
     const std::size_t middle = begin + (end - begin) / 2;
     SolveCluster(scene, begin, middle, receivers, scratch);
     SolveCluster(scene, middle, end, receivers, scratch);
