@@ -4,7 +4,7 @@
 // samples and pays for every one. Here neighbouring receivers form clusters; a cluster collects the leaves that its
 // shaft to the light meets; packets of receivers test them, what hides most first, against the part of the light that
 // nothing has blocked yet, and stop when there is none. Clusters that see too many small parts go sample by sample
-// instead (cluster_beams-inl.h).
+// instead (cluster_beams-inl.h); receivers far from each other form clusters of few.
 #pragma once
 
 #include <memory>
