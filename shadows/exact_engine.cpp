@@ -157,6 +157,13 @@ void ScratchPool::start(std::size_t threads, const BlockerTree& tree, const Exac
     turning = std::max(turning, s->turning.capacity());
     edges = std::max(edges, s->net_edges.vertex[0].size());
   }
+  // How long these lists get depends on which thread met what before: twice the longest so far is room enough.
+  const auto with_room = [](std::size_t longest, std::size_t& room) {
+    if (longest > room) room = 2 * longest;
+    return room;
+  };
+  facing = with_room(facing, facing_room_), turning = with_room(turning, turning_room_);
+  edges = with_room(edges, edges_room_);
   const bool is_cloud = !light.bound.flat;
   const std::size_t cells = cells_anywhere(light.samples.count, light.samples.sets);
   free_.clear();

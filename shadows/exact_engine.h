@@ -66,6 +66,7 @@ class ScratchPool {
   std::mutex mutex_;
   std::vector<std::unique_ptr<ExactScratch>> scratches_;
   std::vector<ExactScratch*> free_;
+  std::size_t edges_room_ = 0, facing_room_ = 0, turning_room_ = 0;  // of each scratch's lists
 };
 
 /// Scratch of a call.
