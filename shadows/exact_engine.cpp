@@ -98,7 +98,9 @@ void solve_side(const ExactBlockers& blockers, const ReceiverArray& receivers, c
   gather_receivers(receivers, order, 0, kernel);  // no masks but the caller's
   kernel.words = masks.words_per_receiver;
   kernel.mask_at.resize(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
+  parallel_ranges(order.size(), 16384, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i != end; ++i) kernel.mask_at[i] = masks.words.data() + order[i] * kernel.words;
+  });
   stats.index_ms += watch.lap();
   fit_side(blockers, samples, side);
   stats.cull_ms += watch.lap();

@@ -18,9 +18,12 @@ void gather_receivers(const ReceiverArray& receivers, const std::vector<std::uin
   k.count = order.size();
   k.words = words;
   const std::size_t padded = order.size() + KernelReceivers::kLanePadding;
-  k.x.assign(padded, 0.0f), k.y.assign(padded, 0.0f), k.z.assign(padded, 0.0f);
-  k.own.assign(padded, kNone), k.open.assign(padded, ~0u);
-  k.set.assign(padded, 0);
+  k.x.resize(padded), k.y.resize(padded), k.z.resize(padded);
+  k.own.resize(padded), k.open.resize(padded), k.set.resize(padded);
+  for (std::size_t i = order.size(); i != padded; ++i) {
+    k.x[i] = k.y[i] = k.z[i] = 0.0f;
+    k.own[i] = kNone, k.open[i] = ~0u, k.set[i] = 0;
+  }
   k.masks.assign(order.size() * words, 0);
   k.mask_at.clear();
   parallel_ranges(order.size(), 8192, [&](std::size_t begin, std::size_t end) {
@@ -29,6 +32,7 @@ void gather_receivers(const ReceiverArray& receivers, const std::vector<std::uin
       k.x[i] = p.x, k.y[i] = p.y, k.z[i] = p.z;
       k.own[i] = receivers.triangle[order[i]];
       k.set[i] = receivers.set[order[i]];
+      k.open[i] = ~0u;
     }
   });
 }

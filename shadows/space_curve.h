@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "halfshade/types.h"
 #include "rasterizer/core/radix_sort.h"
@@ -34,16 +37,16 @@ constexpr std::uint32_t rotated_left(std::uint32_t b, std::uint32_t by) {
 /// Hilbert's curve: neighbours along it are neighbours in space. Cells are cubes.
 ///
 /// Level by level an octant's number along the curve follows from where the curve enters and leaves the cell, and both
-/// are found for the octant (C. Hamilton, "Compact Hilbert Indices", 2006, section 2).
+/// are found for the octant (C. Hamilton, "Compact Hilbert Indices", 2006, section 2). Two levels are one step here.
 class HilbertCurve {
  public:
   static vec3 cells(const vec3& extent) { return vec3(1023.0f / std::max({extent.x, extent.y, extent.z, 1e-30f})); }
   static std::uint32_t code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     const std::uint32_t bits = MortonCurve::code(x, y, z);
     std::uint32_t code = 0, state = 0;
-    for (int shift = 27; shift >= 0; shift -= 3) {
-      const Step step = kSteps[8 * state + (bits >> shift & 7)];
-      code = code << 3 | step.digit;
+    for (int shift = 24; shift >= 0; shift -= 6) {
+      const Step step = kSteps[64 * state + (bits >> shift & 63)];
+      code = code << 6 | step.digit;
       state = step.state;
     }
     return code;
@@ -53,32 +56,57 @@ class HilbertCurve {
   struct Step {
     std::uint8_t digit, state;  // of 24: corner of entry + 8 x axis of exit
   };
-  static constexpr std::array<Step, 24 * 8> kSteps = [] {
-    std::array<Step, 24 * 8> steps{};
+  static constexpr Step step(std::uint32_t state, std::uint32_t octant) {
+    const std::uint32_t entry = state % 8, axis = state / 8;
+    const std::uint32_t gray = rotated_left(octant ^ entry, 3 - (axis + 1) % 3);
+    const std::uint32_t w = gray ^ gray >> 1 ^ gray >> 2;  // the octant's place along the curve
+    const std::uint32_t even = w == 0 ? 0 : (w - 1) / 2 * 2, to_entry = even ^ even >> 1;
+    const auto to_axis = w == 0 ? 0u : static_cast<std::uint32_t>(std::countr_one(w % 2 == 0 ? w - 1 : w)) % 3;
+    const std::uint32_t next_entry = entry ^ rotated_left(to_entry, axis + 1), next_axis = (axis + to_axis + 1) % 3;
+    return {static_cast<std::uint8_t>(w), static_cast<std::uint8_t>(next_entry + 8 * next_axis)};
+  }
+  static constexpr auto make_steps() {
+    std::array<Step, 24 * 64> steps{};
     for (std::uint32_t state = 0; state < 24; ++state) {
-      const std::uint32_t entry = state % 8, axis = state / 8;
-      for (std::uint32_t octant = 0; octant < 8; ++octant) {
-        const std::uint32_t gray = rotated_left(octant ^ entry, 3 - (axis + 1) % 3);
-        const std::uint32_t w = gray ^ gray >> 1 ^ gray >> 2;  // the octant's place along the curve
-        const std::uint32_t even = w == 0 ? 0 : (w - 1) / 2 * 2, to_entry = even ^ even >> 1;
-        const auto to_axis = w == 0 ? 0u : static_cast<std::uint32_t>(std::countr_one(w % 2 == 0 ? w - 1 : w)) % 3;
-        const std::uint32_t next_entry = entry ^ rotated_left(to_entry, axis + 1), next_axis = (axis + to_axis + 1) % 3;
-        steps[8 * state + octant] = {static_cast<std::uint8_t>(w),
-                                     static_cast<std::uint8_t>(next_entry + 8 * next_axis)};
+      for (std::uint32_t octants = 0; octants < 64; ++octants) {
+        const Step first = step(state, octants >> 3), second = step(first.state, octants & 7);
+        steps[64 * state + octants] = {static_cast<std::uint8_t>(first.digit << 3 | second.digit), second.state};
       }
     }
     return steps;
-  }();
+  }
+  static const std::array<Step, 24 * 64> kSteps;
 };
+inline constexpr std::array<HilbertCurve::Step, 24 * 64> HilbertCurve::kSteps = HilbertCurve::make_steps();
 
 /// Kept from call to call so that ordering again allocates nothing.
 struct CurveScratch {
   using Key = std::pair<std::uint32_t, std::uint32_t>;  // code, index
+  static constexpr std::size_t kPart = 1 << 16;         // points that one thread bounds
   std::vector<Key> keys, scratch;
+  std::vector<std::pair<vec3, vec3>> bounds;
   RadixCounts counts;
 
-  void reserve(std::size_t count) { keys.reserve(count), scratch.reserve(count), counts.reserve(count); }
+  void reserve(std::size_t count) {
+    keys.reserve(count), scratch.reserve(count), bounds.reserve((count + kPart - 1) / kPart), counts.reserve(count);
+  }
 };
+
+/// The box around points within [-2, 2]; `parts` is scratch.
+inline std::pair<vec3, vec3> bounds_of(std::span<const vec3> points, std::vector<std::pair<vec3, vec3>>& parts) {
+  constexpr std::size_t kPart = CurveScratch::kPart;
+  const std::pair<vec3, vec3> nothing{vec3(2.0f), vec3(-2.0f)};
+  parts.resize((points.size() + kPart - 1) / kPart);
+  parallel_tasks(parts.size(), [&](std::size_t part) {
+    auto [low, high] = nothing;
+    for (const vec3& p : points.subspan(part * kPart, std::min(kPart, points.size() - part * kPart)))
+      low = glm::min(low, p), high = glm::max(high, p);
+    parts[part] = {low, high};
+  });
+  auto [low, high] = nothing;
+  for (const auto& part : parts) low = glm::min(low, part.first), high = glm::max(high, part.second);
+  return {low, high};
+}
 
 /// Indices of the points for which keep(index) holds, by the place of their cell along the curve through 1024^3 cells
 /// around all points; within a cell by index.
@@ -88,8 +116,7 @@ void order_along(std::span<const vec3> points, const Keep& keep, CurveScratch& s
   constexpr std::uint32_t kDropped = 1u << 30;  // behind all codes
   auto& keys = scratch.keys;
   keys.resize(points.size());
-  vec3 low(2.0f), high(-2.0f);
-  for (const vec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
+  const auto [low, high] = bounds_of(points, scratch.bounds);
   const vec3 scale = Curve::cells(high - low);
   parallel_ranges(points.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
@@ -103,12 +130,12 @@ void order_along(std::span<const vec3> points, const Keep& keep, CurveScratch& s
   });
   const auto code = [](const CurveScratch::Key& key) { return key.first; };
   parallel_radix_sort(keys, scratch.scratch, kDropped + 1, code, scratch.counts);
-  order.clear();
-  order.reserve(points.size());
-  for (const auto& key : keys) {
-    if (key.first == kDropped) break;
-    order.push_back(key.second);
-  }
+  const auto end =
+      std::partition_point(keys.begin(), keys.end(), [](const auto& key) { return key.first != kDropped; });
+  order.resize(static_cast<std::size_t>(end - keys.begin()));
+  parallel_ranges(order.size(), 16384, [&](std::size_t begin, std::size_t last) {
+    for (std::size_t i = begin; i != last; ++i) order[i] = keys[i].second;
+  });
 }
 
 template <class Curve, class Keep>
