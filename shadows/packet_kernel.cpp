@@ -66,6 +66,8 @@ class PacketSolver {
                    const std::uint32_t* doubtful, std::uint32_t* blocked);
   const LeafView& ViewLeaf(const BlockerTree::Node& group, std::uint32_t k);
   void StoreMasks();
+  void StoreSamplesAnywhere();
+  void StoreRows();
 
   HWY_NOINLINE UintVec WindSamples(std::uint32_t line, std::uint32_t asked, UintVec& doubtful) const;
 
@@ -320,27 +322,46 @@ bool PacketSolver::RasterizePatch(const BlockerTree::Node& group, const GroupVie
   return true;
 }
 
-void PacketSolver::StoreMasks() {
+void PacketSolver::StoreMasks() { rows_.anywhere ? StoreSamplesAnywhere() : StoreRows(); }
+
+void PacketSolver::StoreSamplesAnywhere() {
   for (std::size_t lane = 0; lane < packet_.count; ++lane) {
-    std::uint64_t* mask = receivers_.mask(packet_.first + lane);
+    std::uint64_t* const mask = receivers_.mask(packet_.first + lane);
     for (std::uint32_t line = 0; line < rows_.lines; ++line) {
-      std::uint64_t blocked = rows_.valid_of(packet_.set[lane], line) & ~packet_.open[line][lane];
-      if (blocked == 0) continue;
-      if (rows_.anywhere) {
-        const std::uint16_t* const sample =
-            rows_.sample_of.data() + packet_.set[lane] * rows_.stride + line * SampleRows::kWord;
-        for (; blocked != 0; blocked &= blocked - 1) {
-          const std::uint16_t s = sample[std::countr_zero(blocked)];
-          mask[s / 64] |= std::uint64_t{1} << s % 64;
-        }
-        continue;
+      const std::uint16_t* const sample =
+          rows_.sample_of.data() + packet_.set[lane] * rows_.stride + line * SampleRows::kWord;
+      for (std::uint32_t blocked = rows_.valid_of(packet_.set[lane], line) & ~packet_.open[line][lane]; blocked != 0;
+           blocked &= blocked - 1) {
+        const std::uint16_t s = sample[std::countr_zero(blocked)];
+        mask[s / 64] |= std::uint64_t{1} << s % 64;
       }
-      const std::int32_t first = rows_.first[line];
-      if (first < 0) blocked >>= -first;  // columns before the row's first sample
-      const std::size_t at = static_cast<std::size_t>(std::max(first, 0)), shift = at % 64;
-      mask[at / 64] |= blocked << shift;
-      if (shift > 32 && blocked >> (64 - shift) != 0) mask[at / 64 + 1] |= blocked >> (64 - shift);
     }
+  }
+}
+
+/// The lines of all receivers at once into words of 32 samples, and these into the masks.
+void PacketSolver::StoreRows() {
+  const UintTag du;
+  constexpr std::size_t kMostWords = SampleRows::kMaxLines;
+  alignas(HWY_MAX_BYTES) std::uint32_t words[kMostWords + 1][kMaxLanes];
+  const std::size_t count = 2 * receivers_.words;
+  for (std::size_t w = 0; w <= count; ++w) hn::Store(hn::Zero(du), du, words[w]);
+  for (std::uint32_t line = 0; line < rows_.lines; ++line) {
+    UintVec blocked = hn::AndNot(hn::Load(du, packet_.open[line]), hn::Set(du, rows_.valid[line]));
+    if (hn::AllTrue(du, hn::Eq(blocked, hn::Zero(du)))) continue;
+    const std::int32_t first = rows_.first[line];
+    if (first < 0) blocked = hn::ShiftRightSame(blocked, -first);  // columns before the row's first sample
+    const std::size_t at = static_cast<std::size_t>(std::max(first, 0));
+    const auto shift = static_cast<int>(at % 32);
+    const auto add = [&](std::size_t w, UintVec bits)
+                         HWY_ATTR { hn::Store(hn::Or(hn::Load(du, words[w]), bits), du, words[w]); };
+    add(at / 32, hn::ShiftLeftSame(blocked, shift));
+    if (shift != 0) add(at / 32 + 1, hn::ShiftRightSame(blocked, 32 - shift));
+  }
+  for (std::size_t lane = 0; lane < packet_.count; ++lane) {
+    std::uint64_t* const mask = receivers_.mask(packet_.first + lane);
+    for (std::size_t w = 0; w < receivers_.words; ++w)
+      mask[w] |= words[2 * w][lane] | std::uint64_t{words[2 * w + 1][lane]} << 32;
   }
 }
 
