@@ -84,28 +84,31 @@ struct CurveScratch {
   using Key = std::pair<std::uint32_t, std::uint32_t>;  // code, index
   static constexpr std::size_t kPart = 1 << 16;         // points that one thread bounds
   std::vector<Key> keys, scratch;
-  std::vector<std::pair<vec3, vec3>> bounds;
+  struct Box {
+    vec3 low{2.0f}, high{-2.0f};
+  };
+  std::vector<Box> boxes;  // of the parts
   RadixCounts counts;
 
   void reserve(std::size_t count) {
-    keys.reserve(count), scratch.reserve(count), bounds.reserve((count + kPart - 1) / kPart), counts.reserve(count);
+    keys.reserve(count), scratch.reserve(count), boxes.reserve((count + kPart - 1) / kPart), counts.reserve(count);
   }
 };
 
 /// The box around points within [-2, 2]; `parts` is scratch.
-inline std::pair<vec3, vec3> bounds_of(std::span<const vec3> points, std::vector<std::pair<vec3, vec3>>& parts) {
+inline CurveScratch::Box box_of(std::span<const vec3> points, std::vector<CurveScratch::Box>& parts) {
   constexpr std::size_t kPart = CurveScratch::kPart;
-  const std::pair<vec3, vec3> nothing{vec3(2.0f), vec3(-2.0f)};
   parts.resize((points.size() + kPart - 1) / kPart);
   parallel_tasks(parts.size(), [&](std::size_t part) {
-    auto [low, high] = nothing;
+    CurveScratch::Box box;
     for (const vec3& p : points.subspan(part * kPart, std::min(kPart, points.size() - part * kPart)))
-      low = glm::min(low, p), high = glm::max(high, p);
-    parts[part] = {low, high};
+      box.low = glm::min(box.low, p), box.high = glm::max(box.high, p);
+    parts[part] = box;
   });
-  auto [low, high] = nothing;
-  for (const auto& part : parts) low = glm::min(low, part.first), high = glm::max(high, part.second);
-  return {low, high};
+  CurveScratch::Box all;
+  for (const CurveScratch::Box& box : parts)
+    all.low = glm::min(all.low, box.low), all.high = glm::max(all.high, box.high);
+  return all;
 }
 
 /// Indices of the points for which keep(index) holds, by the place of their cell along the curve through 1024^3 cells
@@ -116,11 +119,11 @@ void order_along(std::span<const vec3> points, const Keep& keep, CurveScratch& s
   constexpr std::uint32_t kDropped = 1u << 30;  // behind all codes
   auto& keys = scratch.keys;
   keys.resize(points.size());
-  const auto [low, high] = bounds_of(points, scratch.bounds);
-  const vec3 scale = Curve::cells(high - low);
+  const CurveScratch::Box box = box_of(points, scratch.boxes);
+  const vec3 scale = Curve::cells(box.high - box.low);
   parallel_ranges(points.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      const vec3 q = (points[i] - low) * scale;
+      const vec3 q = (points[i] - box.low) * scale;
       const auto index = static_cast<std::uint32_t>(i);
       keys[i] = {!keep(index) ? kDropped
                               : Curve::code(static_cast<std::uint32_t>(q.x), static_cast<std::uint32_t>(q.y),
