@@ -135,6 +135,7 @@ void order_along(std::span<const vec3> points, const Keep& keep, CurveScratch& s
   parallel_radix_sort(keys, scratch.scratch, kDropped + 1, code, scratch.counts);
   const auto end =
       std::partition_point(keys.begin(), keys.end(), [](const auto& key) { return key.first != kDropped; });
+  order.reserve(points.size());  // whatever share of them is kept in the next frame
   order.resize(static_cast<std::size_t>(end - keys.begin()));
   parallel_ranges(order.size(), 16384, [&](std::size_t begin, std::size_t last) {
     for (std::size_t i = begin; i != last; ++i) order[i] = keys[i].second;
