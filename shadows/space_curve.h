@@ -82,34 +82,11 @@ inline constexpr std::array<HilbertCurve::Step, 24 * 64> HilbertCurve::kSteps = 
 /// Kept from call to call so that ordering again allocates nothing.
 struct CurveScratch {
   using Key = std::pair<std::uint32_t, std::uint32_t>;  // code, index
-  static constexpr std::size_t kPart = 1 << 16;         // points that one thread bounds
   std::vector<Key> keys, scratch;
-  struct Box {
-    vec3 low{2.0f}, high{-2.0f};
-  };
-  std::vector<Box> boxes;  // of the parts
   RadixCounts counts;
 
-  void reserve(std::size_t count) {
-    keys.reserve(count), scratch.reserve(count), boxes.reserve((count + kPart - 1) / kPart), counts.reserve(count);
-  }
+  void reserve(std::size_t count) { keys.reserve(count), scratch.reserve(count), counts.reserve(count); }
 };
-
-/// The box around points within [-2, 2]; `parts` is scratch.
-inline CurveScratch::Box box_of(std::span<const vec3> points, std::vector<CurveScratch::Box>& parts) {
-  constexpr std::size_t kPart = CurveScratch::kPart;
-  parts.resize((points.size() + kPart - 1) / kPart);
-  parallel_tasks(parts.size(), [&](std::size_t part) {
-    CurveScratch::Box box;
-    for (const vec3& p : points.subspan(part * kPart, std::min(kPart, points.size() - part * kPart)))
-      box.low = glm::min(box.low, p), box.high = glm::max(box.high, p);
-    parts[part] = box;
-  });
-  CurveScratch::Box all;
-  for (const CurveScratch::Box& box : parts)
-    all.low = glm::min(all.low, box.low), all.high = glm::max(all.high, box.high);
-  return all;
-}
 
 /// Indices of the points for which keep(index) holds, by the place of their cell along the curve through 1024^3 cells
 /// around all points; within a cell by index.
@@ -119,11 +96,12 @@ void order_along(std::span<const vec3> points, const Keep& keep, CurveScratch& s
   constexpr std::uint32_t kDropped = 1u << 30;  // behind all codes
   auto& keys = scratch.keys;
   keys.resize(points.size());
-  const CurveScratch::Box box = box_of(points, scratch.boxes);
-  const vec3 scale = Curve::cells(box.high - box.low);
+  vec3 low(2.0f), high(-2.0f);
+  for (const vec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
+  const vec3 scale = Curve::cells(high - low);
   parallel_ranges(points.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i != end; ++i) {
-      const vec3 q = (points[i] - box.low) * scale;
+      const vec3 q = (points[i] - low) * scale;
       const auto index = static_cast<std::uint32_t>(i);
       keys[i] = {!keep(index) ? kDropped
                               : Curve::code(static_cast<std::uint32_t>(q.x), static_cast<std::uint32_t>(q.y),
